@@ -121,11 +121,13 @@ impl DriveNode {
     }
 
     /// Its state under CiA 402, whether the statusword has been sent or not.
+    #[inline]
     pub fn state(&self) -> DriveState {
         self.axis.power.state
     }
 
     /// The faults that act on the drive, and those that have struck.
+    #[inline]
     pub fn faults(&self) -> &DriveFaults {
         &self.axis.faults
     }
@@ -142,6 +144,7 @@ impl DriveNode {
     }
 
     /// The next frame that the drive transmits.
+    #[inline]
     pub fn outgoing(&mut self) -> Option<Frame> {
         self.outbox.0.pop_front()
     }
@@ -255,6 +258,7 @@ impl DriveNode {
     }
 
     /// Compares the encoder, as the last step read it, with a second one at the joint, where the drive has one.
+    #[inline]
     pub fn compare_encoders(&mut self, now_ns: u64, joint_m: f64) {
         let has_booted = !self.is_off && self.nmt.state.is_some();
         if has_booted && self.axis.compare_encoders(now_ns, joint_m) {
@@ -317,6 +321,7 @@ impl DriveNode {
 
     /// Takes the error state of the drive's CAN controller. Bus-off is a failure of the communication; an emergency
     /// reports the failure after the return of the bus.
+    #[inline]
     pub fn set_error_state(&mut self, now_ns: u64, state: ErrorState) {
         if self.is_off || state == self.error_state {
             return;
