@@ -57,16 +57,16 @@ pub(super) fn identify(args: &IdentifyArgs) -> Result<Exit, Failure> {
 }
 
 fn in_words(answer: &Answer) -> String {
-    let mut text = format!("{:<37}{:>10}{:>12}  95 % interval\n", "key", "start", "found");
+    let mut text = format!("{:<37}{:>10}{:>14}  95 % interval\n", "key", "start", "found");
     for Identified { key, start, found } in &answer.keys {
         let _ = match found {
             Some(Found { value, low, high }) => {
                 let [value, low, high] = [value, low, high].map(|number| in_digits(*number));
-                writeln!(text, "{key:<37}{start:>10}{value:>12}  {low} to {high}")
+                writeln!(text, "{key:<37}{start:>10}{value:>14}  {low} to {high}")
             }
             None => writeln!(
                 text,
-                "{key:<37}{start:>10}{:>12}  the motion does not excite it enough",
+                "{key:<37}{start:>10}{:>14}  the motion does not excite it enough",
                 "undetermined"
             ),
         };
