@@ -121,7 +121,7 @@ pub(super) fn test(args: &TestArgs) -> Result<Exit, Failure> {
         write_document(path, &xml).incomplete()?;
     }
     if let Some(path) = &args.html {
-        write_document(path, &html_of_suite(&report).incomplete()?).incomplete()?;
+        write_document(path, &html_of_suite(&report, path).incomplete()?).incomplete()?;
     }
     if suite.runner.is_interrupted() {
         let over = report.tested.len();

@@ -1,4 +1,4 @@
-"""The page of a run in a browser, used as a hand does: it loads fast, fetches nothing, draws every chart, follows pointer, wheel,
+"""The pages of runs, campaigns, suites and studies in a browser, used as a hand does: it loads fast, fetches nothing, draws every chart, follows pointer, wheel,
 fingers and keys, fits a phone, prints, has a dark face, and axe finds nothing serious. However a run ends, its cause is on the
 first screen, nothing is cut, and the page of a stop opens around the stop.
 
@@ -485,7 +485,7 @@ def is_accessible(sheet: Sheet):
 
 def prints(sheet: Sheet):
     pdf = sheet.page.pdf(prefer_css_page_size=True)
-    assert pdf.startswith(b"%PDF") and 3 <= pdf.count(b"/Type /Page\n") <= 20, pdf.count(b"/Type /Page\n")
+    assert pdf.startswith(b"%PDF") and 1 <= pdf.count(b"/Type /Page\n") <= 20, pdf.count(b"/Type /Page\n")
     sheet.page.emulate_media(media="print")
     hidden = sheet.page.locator("#time-bar, .menu").evaluate_all("all => all.every(one => getComputedStyle(one).display === 'none')")
     assert hidden, "controls are printed"
@@ -511,23 +511,99 @@ def campaign() -> Path:
     return FOLDER / "campaign" / "campaign.html"
 
 
+def suite() -> Path:
+    """The page of a suite of which one scenario fails."""
+    folder = FOLDER / "suite"
+    folder.mkdir()
+    require = "[[require]]\nname = 'near'\nsignal = 'incisal.error'\nduring = 'running'\nmax = '{}'\n"
+    for name, limit in (("good", "1 mm"), ("bad", "2 um")):
+        (folder / f"{name}.toml").write_text(f"name = '{name}'\nduration_s = 2.0\n{require.format(limit)}")
+    command = [MASSETER, "test", folder, "--html", FOLDER / "suite.html", "--out", FOLDER / "kept"]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ended.returncode == 1, ended.stdout + ended.stderr
+    return FOLDER / "suite.html"
+
+
+def study() -> Path:
+    """The page that compares two sessions of a person."""
+    for session, opening in (("before", 18), ("after", 15)):
+        settings = [f"study.session={session}", "study.patient=P1", f"motion.vertical_mm={opening}"]
+        run(session, "--duration", "4", *(part for setting in settings for part in ("--set", setting)))
+    command = [MASSETER, "compare", FOLDER / "before", FOLDER / "after", "--out", FOLDER / "study"]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    return FOLDER / "study" / "compare.html"
+
+
+def follows_links(sheet: Sheet):
+    """Each link of a table leads to a file."""
+    links = sheet.get("[...document.querySelectorAll('td a, th a')].map(({ href }) => href)")
+    assert links and all(Path(link.removeprefix("file://")).exists() for link in links), links
+
+
+def hovered(sheet: Sheet, name: str, series: int, place: int) -> list[str]:
+    """What a chart says of a point under the pointer."""
+    drawing = sheet.chart(name)
+    x, y = sheet.get(f"(() => {{ const {{ plot, series }} = Masseter.handles.get('{name}').chart, one = series[{series}];"
+                     f" return [plot.x.position(one.xs[{place}]), plot.y.position(one.ys[{place}])]; }})()")
+    drawing.hover(position={"x": x, "y": y})
+    return drawing.locator(".box text").all_text_contents()
+
+
+def counts_margins(sheet: Sheet):
+    """The bars of the histogram together are all margins; the pointer says how many have which."""
+    name = sheet.get("[...document.querySelectorAll('#section-result .block-chart')].map(({ id }) => id)")[0]
+    counts = sheet.get(f"Masseter.handles.get('{name}').chart.series.map(({{ ys }}) => ys)")
+    fails, holds = map(sum, counts)
+    results = sheet.page.locator("#requirements td .mark").all_text_contents()
+    assert not results or (fails, holds) == (results.count("FAIL"), results.count("ok")), (counts, results)
+    place = counts[0].index(max(counts[0]))
+    [said] = hovered(sheet, name, 0, place)
+    assert re.match(rf"{counts[0][place]} \w+, margin −?-?\d+ ", said), said
+
+
+def tells_a_suite(sheet: Sheet):
+    """What failed is first, with a link to its run."""
+    assert sheet.page.locator(".panel strong").first.text_content() == "FAILED"
+    first = sheet.page.locator("#scenarios tbody tr").first
+    assert first.locator("a").get_attribute("href") == "kept/bad/report.html", first.text_content()
+    assert sheet.page.locator("#requirements tbody tr .mark").first.text_content() == "FAIL"
+
+
+def tells_a_study(sheet: Sheet):
+    """The pointer on a mean course gives both conditions with their spread; no link has the name of a folder."""
+    assert sheet.get("document.querySelectorAll('#section-courses .chart').length") >= 2
+    said = hovered(sheet, "course-0", 0, 40)
+    assert [line.split("  ")[0] for line in said[1:]] == [
+        f"{session}{ending}" for session in ("before", "after") for ending in ("", ", mean + SD", ", mean − SD")], said
+    assert sheet.page.locator("#recordings a").count() == 0
+
+
 def tells_a_campaign(sheet: Sheet):
-    """Three factors against the margin, three pairs, a row a reason, links that lead somewhere; a dot says which case it is."""
+    """Three factors against the margin, three pairs, a row a reason; a dot says which case it is, and opens the case."""
     assert sheet.get("document.querySelectorAll('#section-margins .chart').length") == 3
     assert sheet.get("document.querySelectorAll('#section-pairs .chart').length") == 3
     reasons = sheet.get("[...document.querySelectorAll('#reasons tbody tr')].map((row) => row.innerText.split('\\t'))")
     failed = [row for row in sheet.get("[...Masseter.handles.values()].flatMap(({ chart }) => chart?.series ?? [])"
                                        ".filter(({ name }) => name === 'did not pass').map(({ xs }) => xs.length)")]
     assert len(reasons) < sum(int(row[1]) for row in reasons) == max(failed), (reasons, failed)
-    links = sheet.get("[...document.querySelectorAll('td a, th a')].map(({ href }) => href)")
-    assert links and all(Path(link.removeprefix("file://")).exists() for link in links), links
-    drawing = sheet.page.locator("#section-margins .chart svg[role=application]").first
-    drawing.scroll_into_view_if_needed()
-    at = sheet.get("(() => { const { chart } = [...Masseter.handles.values()].find(({ chart }) => chart); const [one] = chart.series;"
-                   " return [chart.plot.x.position(one.xs[0]), chart.plot.y.position(one.ys[0]), one.names[0]]; })()")
-    drawing.hover(position={"x": at[0], "y": at[1]})
-    said = drawing.locator(".box").text_content()
-    assert said.startswith(at[2]) and re.match(r"case \d+, PASS, margin ", said), (said, at)
+    name = sheet.get("document.querySelector('#section-margins .block-chart').id")
+    said = hovered(sheet, name, 0, 0)
+    assert re.match(r"case \d+, PASS, margin ", said[0]), said
+    case = sheet.get(f"Masseter.handles.get('{name}').chart.series[0].links[0]")
+    assert Path(FOLDER / "campaign" / case).exists(), case
+
+
+def opens_a_case(browser, path: Path):
+    """A click on a dot."""
+    sheet = Sheet(browser, path)
+    name = sheet.get("document.querySelector('#section-margins .block-chart').id")
+    hovered(sheet, name, 0, 0)
+    sheet.page.mouse.down()
+    with sheet.page.expect_navigation():
+        sheet.page.mouse.up()
+    assert re.search(r"/(cases/\w+/result\.json|worst/[^/]+/report\.html)$", sheet.page.url), sheet.page.url
+    sheet.page.context.close()
 
 
 def main():
@@ -549,7 +625,7 @@ def main():
     dated = FOLDER / "dated.html"
     dated.write_text(chewing.read_text().replace('"wall_s":null', '"wall_s":1790250400.25'))
     food = run("food", "examples/food.toml")
-    varied = campaign()
+    varied, tested, compared = campaign(), suite(), study()
     size_mb = long.stat().st_size / 1e6
     assert size_mb <= LARGEST_MB, f"60 s take {size_mb:.2f} MB"
     with sync_playwright() as playwright:
@@ -566,8 +642,11 @@ def main():
             (failed, {}, [shows_what_was_judged]),
             (stopped, {}, [opens_around_the_stop]),
             (dated, {}, [tells_wall_time]),
-            (varied, {}, [tells_a_campaign, fits_the_screen, is_accessible, prints]),
-            (varied, {"viewport": PHONE, "is_mobile": True, "color_scheme": "dark"}, [fits_the_screen, is_accessible]),
+            (varied, {}, [tells_a_campaign, counts_margins, follows_links, fits_the_screen, is_accessible, prints]),
+            (tested, {}, [tells_a_suite, counts_margins, follows_links, fits_the_screen, is_accessible, prints]),
+            (compared, {}, [tells_a_study, fits_the_screen, is_accessible, prints]),
+            *((path, {"viewport": PHONE, "is_mobile": True, "color_scheme": "dark"}, [fits_the_screen, is_dark, is_accessible])
+              for path in (varied, tested, compared)),
             (food, {}, [bites, is_accessible]),
             (stopped, {}, [marks_the_stop, draws_every_chart, prints]),
             (chewing, {"color_scheme": "dark"}, [is_dark, is_accessible, prints]),
@@ -578,6 +657,7 @@ def main():
                 check(sheet)
             sheet.close()
         names_its_view(browser, chewing)
+        opens_a_case(browser, varied)
         for path, words, next_step in (
             (failed, "failed: close: rms of incisal.error", "the limit in [[require]]"),
             (stopped, "process data missing", "set expect.verdict to safe_stop"),

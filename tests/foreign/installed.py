@@ -1,6 +1,8 @@
-"""A folder of scripts/release, installed where there is no source and no Rust: new controllers are made, built, run and judged.
+"""A folder of scripts/release, installed where there is no source and no Rust: new controllers are made, built, run and judged, and
+every tutorial is followed.
 
     installed.py FOLDER
+    installed.py FOLDER --tutorials             # only those that need no project
 
 As root, the source is hidden by a mount while it runs. It needs a C and a C++ compiler, pkg-config, and packages from PyPI.
 """
@@ -36,12 +38,10 @@ class Installed:
         path = [self.sdk / "bin", tools / "bin", "/usr/local/bin", "/usr/bin", "/bin"]
         # Nothing else of this environment: pip may need to know where its index is.
         kept = {name: value for name, value in os.environ.items() if name.startswith("PIP_") or name.lower().endswith("_proxy")}
-        self.environment = {**kept, "HOME": str(home), "LANG": "C.UTF-8", "PATH": ":".join(map(str, path))}
+        self.environment = {**kept, "HOME": str(home), "LANG": "C.UTF-8", "NO_COLOR": "1", "PATH": ":".join(map(str, path))}
         found = [name for name in RUST if shutil.which(name, path=self.environment["PATH"])]
         assert not found, f"Rust is on the PATH: {found}"
         subprocess.run([sys.executable, "-m", "venv", str(tools)], check=True, env=self.environment)
-        # The project's own build command calls this Python, and CMake.
-        self.shell(f"{tools}/bin/pip install --quiet --disable-pip-version-check cmake")
 
     def shell(self, command: str, folder: Path | None = None, code: int = 0) -> str:
         """What a command prints, which must end with this code."""
@@ -93,6 +93,8 @@ def new_project(installed: Installed, language: str) -> tuple[str, str]:
 
 
 def check_projects(installed: Installed) -> str:
+    # The project's own build command calls CMake.
+    installed.shell("pip install --quiet --disable-pip-version-check cmake")
     digests = {}
     for language in LANGUAGES:
         began_s = time.monotonic()
@@ -129,23 +131,49 @@ def check_package(installed: Installed) -> None:
 
 #: Ends the output of a command, before its exit code.
 MARK = "\x01"
+#: This tutorial makes a project, and pip then installs an environment of its own.
+OF_A_PROJECT = "your-controller"
 
 
-def check_tutorial(installed: Installed) -> None:
-    """Every command of the tutorial shows what the document says, in one shell; … is text left out."""
-    text = (installed.sdk / "docs/tutorials/your-controller.md").read_text()
+def console_steps(text: str) -> list[tuple[str, str]]:
+    """Each command of the console blocks, with the output that the document shows; `> ` continues a command."""
     blocks = "".join(re.findall(r"^```console\n(.*?)^```$", text, re.MULTILINE | re.DOTALL))
-    steps = re.findall(r"^\$ (.*)\n((?:(?!\$ ).*\n)*)", blocks, re.MULTILINE)
-    assert len(steps) >= 10, steps
-    folder = installed.root / "tutorial"
-    folder.mkdir()
+    steps = re.findall(r"^\$ (.*\n(?:> .*\n)*)((?:(?!\$ ).*\n)*)", blocks, re.MULTILINE)
+    return [(command.replace("\n> ", "\n").rstrip("\n"), shown) for command, shown in steps]
+
+
+def follow(installed: Installed, document: Path) -> int:
+    """Every command shows what the document says, in one shell and a new folder with the examples; … is text left out."""
+    text = document.read_text()
+    steps = console_steps(text)
+    folder = installed.root / "tutorials" / document.stem
+    folder.mkdir(parents=True)
+    if "](../install.md#examples-and-documents)" in text:
+        shutil.copytree(installed.sdk / "examples", folder / "examples")
     script = "".join(f"{command}\nprintf '{MARK}%d\\n' $?\n" for command, _ in steps)
     said = installed.shell(f"exec 2>&1\n{script}", folder).split(MARK)
     for (command, shown), output, code in zip(steps, [said[0], *(rest.partition("\n")[2] for rest in said[1:])], said[1:], strict=False):
         expected = re.escape(re.sub("^…\n", "…", shown, flags=re.MULTILINE)).replace("…", ".*")
-        assert code.startswith("0\n") and re.fullmatch(expected, output, re.DOTALL), f"$ {command}\n{output}\nexit code {code}"
-    assert len(said) == len(steps) + 1, "the shell ended early"
-    print(f"tutorial: {len(steps)} commands show what the document says")
+        assert code.startswith("0\n") and re.fullmatch(expected, output, re.DOTALL), f"{document}: $ {command}\n{output}\nexit code {code}"
+    assert len(said) == len(steps) + 1, f"{document}: the shell ended early"
+    if ">>> " in text:
+        packages = " ".join(re.findall(r"`pip install (\S+)`", text))
+        wheel = next(installed.sdk.glob("*.whl"))
+        installed.shell(f"pip install --quiet --disable-pip-version-check '{wheel}' {packages}")
+        installed.shell(f"python -m doctest '{document}'", folder)
+    return len(steps) + text.count(">>> ")
+
+
+def check_tutorials(installed: Installed, with_projects: bool) -> None:
+    """A reader has the documents of the folder, and an empty one."""
+    documents = sorted((installed.sdk / "docs/tutorials").glob("*.md"))
+    documents = [document for document in documents if with_projects or document.stem != OF_A_PROJECT]
+    for document in documents:
+        for link in re.findall(r"\]\(([^)#:]+)", document.read_text()):
+            assert (document.parent / link).exists(), f"{document}: {link} is not in the folder"
+    counts = {document.stem: follow(installed, document) for document in documents}
+    assert all(counts.values()) and len(counts) >= 6, counts
+    print(f"tutorials: {sum(counts.values())} commands of {len(counts)} pages show what they say without the source")
 
 
 def without_source(arguments: list[str]) -> None:
@@ -157,22 +185,26 @@ def without_source(arguments: list[str]) -> None:
 
 
 HIDDEN = "--hide-source"
+TUTORIALS = "--tutorials"
 
 
-def main(release: str, *hidden: str) -> None:
-    if not hidden:
-        without_source([release])
+def main(release: str, *options: str) -> None:
+    if HIDDEN not in options:
+        without_source([release, *options])
     with tempfile.TemporaryDirectory() as name:
         installed = Installed(Path(release), Path(name))
-        if hidden:
+        if HIDDEN in options:
             subprocess.run(["mount", "-t", "tmpfs", "none", str(PROJECT)], check=True)
             assert not (PROJECT / "Cargo.toml").exists()
+        if TUTORIALS in options:
+            check_tutorials(installed, with_projects=False)
+            return
         check_content(installed.sdk)
         check_linking(installed)
         expected = check_projects(installed)
         check_pkg_config(installed, expected)
         check_package(installed)
-        check_tutorial(installed)
+        check_tutorials(installed, with_projects=True)
 
 
 main(*sys.argv[1:])

@@ -1,7 +1,7 @@
 //! Charts as SVG: lines and dots over two axes, with round ticks and one palette.
 //!
-//! Pictures that stand without a browser's scripts are drawn here: plots of a campaign, and recorded motions. The page of a
-//! run draws itself (`masseter-page`).
+//! Pictures that stand without a browser's scripts are drawn here: figures for print, and recorded motions. Pages draw
+//! themselves (`masseter-page`).
 //!
 //! ```
 //! use masseter_charts::{Axis, BLUE, Chart, Look, Series, drawing};

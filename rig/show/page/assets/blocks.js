@@ -30,7 +30,7 @@
   Masseter.block('table', (holder, data, clock) => {
     const cell = (content, { title, is_number: isNumber }, isFirst) => {
       const td = element(isFirst ? 'th' : 'td', { class: isNumber ? 'number' : '', scope: isFirst ? 'row' : null, 'data-title': title });
-      if (typeof content === 'string') td.append(...rich(isNumber ? content.replace(/^-/, '\u2212') : content));
+      if (typeof content === 'string') td.append(...rich(isNumber ? content.replace(/-(?=[\d.])/g, '\u2212') : content));
       else if (content.href !== undefined) td.append(element('a', { href: content.href }, content.text));
       else if (content.mark !== undefined) td.append(element('span', { class: `mark ${content.tone}` }, content.mark));
       else td.append(timeButton(content.at_s, clock));

@@ -10,6 +10,8 @@
   const FAR = 0.6;
   // A curve that turns more often than every so many pixels is drawn as the band between its ends in columns of twice the width.
   const DENSE = 8;
+  // A click opens the file of a dot within this distance, px.
+  const NEAR = 10;
   const BANDED = ['desired', 'true', 'estimated'];
   const PALETTE = 8;
   const OWN_COLOUR = { desired: 'desired', true: 'true', estimated: 'estimated' };
@@ -37,7 +39,7 @@
     const own = series.colour === undefined && OWN_COLOUR[series.style];
     const stroke = own ? `var(--${own})` : `var(--c${number % PALETTE})`;
     const isSecond = !own && number >= PALETTE;
-    return { name: series.name, style: series.style, xs, ys, step: Infinity, stroke, isSecond, isShown: !series.is_hidden, place, names: series.names || [] };
+    return { name: series.name, style: series.style, xs, ys, step: Infinity, stroke, isSecond, isShown: !series.is_hidden, place, names: series.names || [], links: series.links || [] };
   }
 
   function preparedAll(data) {
@@ -106,7 +108,8 @@
 
   Masseter.chart = (holder, data, clock) => {
     const isTime = data.across === 'time', isLog = data.scale === 'log', names = data.scale.names;
-    const other = data.across.quantity, isDots = data.series.some(({ style }) => style === 'dots');
+    const other = data.across.quantity, isBars = data.series.some(({ style }) => style === 'bars');
+    const isDots = isBars || data.series.some(({ style }) => style === 'dots'), hasLinks = data.series.some(({ links }) => links);
     const view = isTime ? clock : ownView(data.across, () => moveCursor());
     const clip = `clip-${clips += 1}`;
     let series = preparedAll(data), plot = null, isDirty = true, isVisible = true, isWaiting = false, isUnderPointer = false, isBanded = false, pointerY = null;
@@ -125,6 +128,11 @@
         const values = series.filter(({ isShown }) => isShown).map((one) => [one.name, Masseter.valueAt(one, view.cursor)]);
         return [view.text(view.cursor), ...values.filter(([, value]) => value !== null).map(([name, value]) => `${name} ${valueText(value)}`)].join(', ');
       },
+      // Opens the file of the dot under the pointer, or of the chosen one.
+      open(isChosen) {
+        const dot = isDots && plot && view.cursor !== null ? nearestDot() : null;
+        if (dot && (isChosen || dot.way < NEAR) && dot.one.links[dot.place]) location.href = dot.one.links[dot.place];
+      },
       setPointer(is, y = null) { isUnderPointer = is; pointerY = y; moveCursor(); },
       redraw,
       draw,
@@ -135,7 +143,7 @@
         const [low, high] = ys.reduce(([least, most], y) => [Math.min(least, y), Math.max(most, y)], [Infinity, -Infinity]);
         return `${name} from ${Masseter.significant(low)} to ${Masseter.significant(high)} ${data.unit}`;
       });
-      return ranges.length ? `${data.title}. ${ranges.join('; ')}. Arrow keys move the cursor.` : `${data.title}. ${data.otherwise}`;
+      return ranges.length ? `${data.title}. ${ranges.join('; ')}. Arrow keys move the cursor.${hasLinks ? ' Enter opens the case.' : ''}` : `${data.title}. ${data.otherwise}`;
     }
 
     // Draws in the next frame, or once the chart is seen.
@@ -165,7 +173,7 @@
       const room = { ...ROOM, ...(width < NARROW.width ? NARROW : {}) };
       if (names) room.left = Math.min(0.4 * width, Math.max(room.left, 12 + Math.max(...names.map((name) => Masseter.textWidth(name, 11.5)))));
       // A share is drawn from nothing on.
-      if (data.unit === '%') found[0] = Math.min(found[0], 0);
+      if (data.unit === '%' || isBars) found[0] = Math.min(found[0], 0);
       const { ends, near, beyond } = names ? { ends: [-0.5, names.length - 0.5], near: [], beyond: [] } : fitted(found, data.limits || [], isLog);
       const right = Math.max(room.left + 1, width - room.right);
       const x = Masseter.axis(other ? other.scale === 'log' : !isTime, window, [room.left, right]);
@@ -180,7 +188,8 @@
       drawing.append(...grid(), svg('g', { 'clip-path': `url(#${clip})` }, ...shades(), ...near.map(level), ...shown.map(curve)), ...near.map(levelName));
       drawing.append(...moments.map(mark), svg('g', { class: 'cursor' }));
       words.textContent = [beyond.length ? `Not in the picture: ${beyond.map(inWords).join('; ')}.` : '',
-        data.is_shaded ? 'Judged: the shaded stretches.' : '', isBanded ? 'Too dense for lines: bands from the lowest to the highest values. Zoom in for the curves.' : ''].filter(Boolean).join(' ');
+        data.is_shaded ? 'Judged: the shaded stretches.' : '', isBanded ? 'Too dense for lines: bands from the lowest to the highest values. Zoom in for the curves.' : '',
+        hasLinks ? 'A click on a dot opens its case.' : ''].filter(Boolean).join(' ');
       moveCursor();
     }
 
@@ -189,6 +198,8 @@
       const xs = series.flatMap((one) => [one.xs[0], one.xs[one.xs.length - 1]]).filter((x) => x !== undefined);
       const [low, high] = xs.length ? [Math.min(...xs), Math.max(...xs)] : [0, 1];
       if (!other) return [low, high];
+      if (isBars) return [low - barWidth() / 2, high + barWidth() / 2];
+      if (series.every(({ style }) => style !== 'dots')) return [low, high];
       // Dots at the ends are whole.
       const room = other.scale === 'log' ? (high / low) ** 0.03 : 0.03 * (high - low || Math.abs(high) || 1);
       return other.scale === 'log' ? [low / room, high * room] : [low - room, high + room];
@@ -202,7 +213,7 @@
 
     function grid() {
       const { x, y, left, right, top, bottom, window } = plot;
-      const many = Math.max(3, Math.floor((right - left) / (isTime ? clock.tickRoom : 64))), few = Math.max(4, Math.floor(data.height / 27));
+      const many = Math.max(3, Math.floor((right - left) / (isTime ? clock.tickRoom : 64))), few = isBars ? Math.min(5, Math.ceil(y.ends[1])) : Math.max(4, Math.floor(data.height / 27));
       const apart = (ticks) => ticks.reduce((kept, tick) => (kept.length && x.position(tick.value) - x.position(kept[kept.length - 1].value) < 52 ? kept : [...kept, tick]), []);
       const across = isTime ? clock.ticks(window, many) : other ? otherTicks(window, many)
         : data.across === 'percentile' ? apart(Masseter.percentileTicks(window)) : Masseter.logTicks(window, many);
@@ -238,7 +249,19 @@
       return `M${left} ${bottom}${xs.map((to, at) => `V${height(at)}H${x.position(to).toFixed(1)}`).join('')}V${bottom}`;
     }
 
+    // Bars are evenly apart, those of all series together.
+    function barWidth() {
+      const [first, second] = series.flatMap(({ xs }) => xs).sort((a, b) => a - b);
+      return second - first;
+    }
+
+    function bars({ xs, ys }) {
+      const { x, y } = plot, half = 0.45 * barWidth(), nothing = y.position(0).toFixed(1);
+      return xs.map((at, place) => (ys[place] > 0 ? `M${x.position(at - half).toFixed(1)} ${nothing}V${y.position(ys[place]).toFixed(1)}H${x.position(at + half).toFixed(1)}V${nothing}Z` : '')).join('');
+    }
+
     function curve(one) {
+      if (one.style === 'bars') return svg('path', { ...strokeOf(one), d: bars(one) });
       if (data.across === 'duration') return svg('path', { ...strokeOf(one), d: stairs(one) });
       const { x, y, window } = plot;
       if (one.style === 'dots') return svg('path', { ...strokeOf(one), d: one.xs.map((at, place) => `M${x.position(at).toFixed(1)} ${y.position(one.ys[place]).toFixed(1)}h0`).join('') });
@@ -299,18 +322,19 @@
       let found = null, least = Infinity;
       series.filter(({ isShown }) => isShown).forEach((one) => one.xs.forEach((at, place) => {
         const x = plot.x.position(at), y = plot.y.position(one.ys[place]);
-        const way = Math.hypot(x - from, pointerY === null ? 0 : y - pointerY);
-        if (way < least) { least = way; found = { one, place, x, y }; }
+        const way = Math.hypot(x - from, pointerY === null || isBars ? 0 : y - pointerY);
+        if (way < least) { least = way; found = { one, place, x, y, way }; }
       }));
       return found;
     }
 
-    const dotLines = (dot) => (dot ? [dot.one.names[dot.place] || dot.one.name, `${other.label}  ${placeText(other.scale, dot.one.xs[dot.place])}`,
+    const dotLines = (dot) => (dot && isBars ? [dot.one.names[dot.place]] : dot ? [dot.one.names[dot.place] || dot.one.name, `${other.label}  ${placeText(other.scale, dot.one.xs[dot.place])}`,
       `${data.title}  ${names ? placeText(data.scale, dot.one.ys[dot.place]) : valueText(dot.one.ys[dot.place])}`] : []);
 
     function markDot(group) {
       const dot = nearestDot();
       if (!dot) return;
+      drawing.style.cursor = dot.one.links[dot.place] && dot.way < NEAR ? 'pointer' : '';
       group.append(svg('circle', { cx: dot.x, cy: dot.y, r: 6, class: 'ring', style: `stroke:${dot.one.stroke}` }));
       if (isUnderPointer) group.append(box(dot.x, dotLines(dot)));
     }

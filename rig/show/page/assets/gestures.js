@@ -64,6 +64,7 @@
       if (fingers.size < 2) pinch = null;
       from = panned = null;
       drawing.querySelector('.chosen')?.remove();
+      if (event.type === 'pointerup' && began !== null && Math.abs(x - began) < SHORT) chart.open(false);
       if (event.type !== 'pointerup' || began === null || !chart.isTime || Math.abs(x - began) < SHORT) return;
       const [low, high] = [valueAt(began), valueAt(x)].sort((a, b) => a - b);
       view.zoom(low, high);
@@ -106,6 +107,7 @@
         '.': () => view.pan(0.25),
         0: () => view.reset(),
         Escape: () => view.reset(),
+        Enter: () => chart.open(true),
       };
       const action = actions[event.key];
       if (!action || event.altKey || event.metaKey || event.ctrlKey) return;

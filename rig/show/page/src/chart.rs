@@ -53,6 +53,8 @@ pub enum Style {
     Smoothed,
     /// Points one by one. The cursor shows the nearest of all.
     Dots,
+    /// Bars from nothing on, evenly apart. The cursor shows the nearest of all.
+    Bars,
 }
 
 /// A curve.
@@ -70,24 +72,47 @@ pub struct Series {
     pub colour: Option<usize>,
     /// Where it goes.
     pub points: Points,
-    /// Of dots: what each point is.
+    /// Of dots and bars: what each point is.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub names: Vec<String>,
+    /// Of dots: the file beside the page that a click opens.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub links: Vec<String>,
+}
+
+/// A dot.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Dot {
+    /// Where it lies.
+    pub at: (f64, f64),
+    /// What it is.
+    pub name: String,
+    /// The file beside the page that a click opens.
+    pub link: String,
 }
 
 impl Series {
     /// In the colour of its style.
     #[must_use]
     pub fn new(name: impl Into<String>, style: Style, points: Points) -> Self {
-        Self { name: name.into(), style, is_hidden: false, colour: None, points, names: Vec::new() }
+        let (names, links) = (Vec::new(), Vec::new());
+        Self { name: name.into(), style, is_hidden: false, colour: None, points, names, links }
     }
 
-    /// Named dots.
+    /// Named dots, each with a file.
     #[must_use]
-    pub fn dots(name: impl Into<String>, dots: impl IntoIterator<Item = ((f64, f64), String)>) -> Self {
-        let finite = dots.into_iter().filter(|((x, y), _)| x.is_finite() && y.abs() < LARGEST);
-        let (points, names): (Vec<_>, _) = finite.unzip();
-        Self { names, ..Self::new(name, Style::Dots, Points::plain(&points)) }
+    pub fn dots(name: impl Into<String>, dots: impl IntoIterator<Item = Dot>) -> Self {
+        let finite = dots.into_iter().filter(|dot| dot.at.0.is_finite() && dot.at.1.abs() < LARGEST);
+        let (points, (names, links)): (Vec<_>, (Vec<_>, Vec<_>)) =
+            finite.map(|dot| (dot.at, (dot.name, dot.link))).unzip();
+        Self { names, links, ..Self::new(name, Style::Dots, Points::plain(&points)) }
+    }
+
+    /// Named bars.
+    #[must_use]
+    pub fn bars(name: impl Into<String>, bars: impl IntoIterator<Item = ((f64, f64), String)>) -> Self {
+        let (points, names): (Vec<_>, _) = bars.into_iter().unzip();
+        Self { names, ..Self::new(name, Style::Bars, Points::plain(&points)) }
     }
 
     /// In a colour of the palette.

@@ -1,4 +1,4 @@
-//! The one page of a run: the report of a finished run as one file, and the view of a run that goes on.
+//! The one page of all results: of a finished run, a run that goes on, a suite, a campaign, a comparison.
 //!
 //! The page is a list of sections, and a section a list of blocks. This crate fixes what a block may be and holds the scripts
 //! that draw the blocks in a browser. Which figures the page shows is decided by its users. Nothing is fetched.
@@ -18,12 +18,14 @@
 
 mod block;
 mod chart;
+mod margins;
 mod page;
 
 pub use block::{
     Block, Cell, Column, Content, EventRow, Events, Live, Pressure, Section, Table, Tone, Tooth, Verdict,
 };
 pub use chart::{
-    Across, Chart, LevelKind, Limit, Moment, MomentKind, Phase, Points, Scale, Series, Style, Time,
+    Across, Chart, Dot, LevelKind, Limit, Moment, MomentKind, Phase, Points, Scale, Series, Style, Time,
 };
+pub use margins::margin_histogram;
 pub use page::{Life, Page, PageError};

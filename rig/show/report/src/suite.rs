@@ -270,6 +270,10 @@ impl<'a> RequirementRow<'a> {
         self.check.figures.as_ref()?.margin
     }
 
+    pub(crate) fn relative_margin(&self) -> Option<f64> {
+        self.check.figures.as_ref()?.relative_margin
+    }
+
     /// The margin before and now, where both have one in the same unit.
     fn margins(&self) -> Option<[f64; 2]> {
         let (figures, before) = (self.check.figures.as_ref()?, self.before?);

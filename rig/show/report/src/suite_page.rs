@@ -1,53 +1,99 @@
-//! The page of a suite: its scenarios, and the table of requirements against scenarios with margins and their trend.
+//! The page of a suite: its result with a histogram of margins, its scenarios with links to the runs that were kept, and the
+//! table of requirements against scenarios with margins and their trend.
 
-use masseter_page::{Block, Cell, Column, Life, Page, PageError, Section, Table, Time, Tone};
+use std::path::Path;
+
+use masseter_judge::CheckResult;
+use masseter_page::{
+    Block, Cell, Column, Content, Life, Page, PageError, Section, Table, Time, Tone, Verdict,
+    margin_histogram,
+};
 
 use crate::page::mark;
 use crate::suite::{Outcome, RequirementRow, SuiteReport, TestedScenario};
-use crate::text::{or_dash, significant};
+use crate::text::{or_dash, seen_from, significant};
 
-/// The page of a suite.
+/// The page of a suite, for this file: the runs that were kept are linked from there.
 ///
 /// # Errors
 /// When the page's data cannot be written.
-pub fn html_of_suite(report: &SuiteReport) -> Result<String, PageError> {
-    let mut sections = vec![scenarios(report)];
+pub fn html_of_suite(report: &SuiteReport, file: &Path) -> Result<String, PageError> {
+    let mut sections = vec![result(report), scenarios(report, file)];
     sections.extend(requirements(report));
     let about = format!("masseter {}, {:.1} s", report.masseter, report.took_s);
-    Page { about, sections, ..Page::new("suite", Life::Finished, Time::default()) }.to_html()
+    Page { about, sections, ..Page::new("Suite", Life::Finished, Time::default()) }.to_html()
 }
 
-fn scenarios(report: &SuiteReport) -> Section {
-    let count = |outcome| report.count(outcome);
-    let [passed, failed, untested] = [Outcome::Passed, Outcome::Failed, Outcome::Untested].map(count);
-    let result = format!("{}: {passed} passed; {failed} failed; {untested} untested", report.word());
-    let lines = [
-        Some(result),
+fn result(report: &SuiteReport) -> Section {
+    let count = |outcome| report.count(outcome).to_string();
+    let counts = [("passed", Outcome::Passed), ("failed", Outcome::Failed), ("untested", Outcome::Untested)]
+        .map(|(name, outcome)| [name.to_owned(), count(outcome)]);
+    let reasons = [
         (!report.unrun.is_empty()).then(|| format!("interrupted, not run: {}", report.unrun.join(", "))),
         (!report.left_out.is_empty()).then(|| format!("left out: {}", report.left_out.join(", "))),
         report.trend_in_words(),
     ];
+    let verdict = Verdict {
+        word: report.word().to_owned(),
+        reason: reasons.into_iter().flatten().collect::<Vec<_>>().join("; "),
+        next: None,
+        tone: if !report.unrun.is_empty() {
+            Tone::Doubtful
+        } else {
+            tone(report.tested.iter().all(|tested| !tested.is_short()))
+        },
+        timing: "simulated".to_owned(),
+        timing_reason: String::new(),
+        timing_tone: Tone::Plain,
+        figures: counts.into(),
+    };
     let warned = report.tested.iter().flat_map(|tested| {
         tested.warnings().iter().map(|warning| format!("warning in {}: {warning}", tested.name))
     });
-    let lines = lines.into_iter().flatten().chain(warned).enumerate();
-    let lines = lines.map(|(place, line)| Block::text(format!("line-{place}"), line));
-    let columns =
-        [Column::texts(&["scenario", "result", "why", "tags"]), Column::numbers(&["attempts", "took, s"])];
-    let table = Table::new("Scenarios", columns, report.tested.iter().map(scenario_row));
-    let blocks = lines.chain([Block::table("scenarios", table)]).collect();
-    Section::new("result", "Result", blocks)
+    let warned = warned.enumerate().map(|(place, line)| Block::text(format!("warning-{place}"), line));
+    let margins: Vec<_> = report.requirements().iter().filter_map(RequirementRow::relative_margin).collect();
+    let histogram = margin_histogram("Requirements by their margin", "requirement", &margins);
+    let histogram = histogram.map(|chart| Block::chart("margins", chart));
+    let blocks =
+        [Block::new("verdict", Content::Verdict(verdict))].into_iter().chain(warned).chain(histogram);
+    Section::new("result", "Result", blocks.collect())
 }
 
-fn scenario_row(tested: &TestedScenario) -> [Cell; 6] {
+fn scenarios(report: &SuiteReport, file: &Path) -> Section {
+    let columns =
+        [Column::texts(&["scenario", "result", "why", "tags"]), Column::numbers(&["attempts", "took, s"])];
+    // What did not pass is first.
+    let mut tested: Vec<_> = report.tested.iter().collect();
+    tested.sort_by_key(|tested| (!tested.is_short(), tested.outcome() == Outcome::Passed));
+    let table = Table::new(
+        "Table of scenarios",
+        columns,
+        tested.into_iter().map(|tested| scenario_row(tested, file)),
+    );
+    Section::new("scenarios", "Scenarios", vec![Block::table("scenarios", table)])
+}
+
+fn tone(is_good: bool) -> Tone {
+    if is_good { Tone::Good } else { Tone::Bad }
+}
+
+/// The report of the last run that was kept, seen from the page.
+fn link(tested: &TestedScenario, file: &Path) -> Option<String> {
+    let folder = tested.attempts.iter().rev().find_map(|attempt| attempt.folder.as_ref())?;
+    seen_from(file, &folder.join("report.html"))
+}
+
+fn scenario_row(tested: &TestedScenario, file: &Path) -> [Cell; 6] {
     let tone = match (tested.outcome(), tested.is_short()) {
         (Outcome::Passed, _) if tested.retries() > 0 => Tone::Doubtful,
         (Outcome::Passed, _) => Tone::Good,
         (_, true) => Tone::Bad,
         (_, false) => Tone::Doubtful,
     };
+    let name = tested.name.clone();
     [
-        tested.name.clone().into(),
+        link(tested, file)
+            .map_or_else(|| name.clone().into(), |href| Cell::Link { text: name.clone(), href }),
         Cell::Mark { mark: tested.outcome().word().to_owned(), tone },
         tested.reason().into(),
         tested.tags.join(", ").into(),
@@ -56,9 +102,11 @@ fn scenario_row(tested: &TestedScenario) -> [Cell; 6] {
     ]
 }
 
-/// None where no scenario requires anything.
+/// Those that failed are first. None where no scenario requires anything.
 fn requirements(report: &SuiteReport) -> Option<Section> {
-    let rows: Vec<_> = report.requirements().iter().map(requirement_row).collect();
+    let mut rows = report.requirements();
+    rows.sort_by_key(|row| row.check.result != CheckResult::Failed);
+    let rows: Vec<_> = rows.iter().map(requirement_row).collect();
     if rows.is_empty() {
         return None;
     }
@@ -66,14 +114,13 @@ fn requirements(report: &SuiteReport) -> Option<Section> {
         Column::texts(&["id", "requirement", "scenario", "result"]),
         Column::numbers(&["margin", "of the limit", "before", "change"]),
     ];
-    let table = Table::new("Requirements by scenario", columns, rows);
+    let table = Table::new("Table of requirements by scenario", columns, rows);
     Some(Section::new("requirements", "Requirements", vec![Block::table("requirements", table)]))
 }
 
 fn requirement_row(row: &RequirementRow<'_>) -> [Cell; 8] {
     let in_unit = |margin: f64| format!("{} {}", significant(margin), row.unit()).trim_end().to_owned();
     let percent = |share: f64| format!("{:.0} %", share * 100.0);
-    let share = row.check.figures.as_ref().and_then(|figures| figures.relative_margin);
     let before = match row.before {
         Some(before) if before.margin.is_none() => before.result.clone(),
         before => or_dash(before.and_then(|before| before.margin), in_unit),
@@ -84,7 +131,7 @@ fn requirement_row(row: &RequirementRow<'_>) -> [Cell; 8] {
         row.scenario.into(),
         mark(row.check.result),
         or_dash(row.margin(), in_unit).into(),
-        or_dash(share, percent).into(),
+        or_dash(row.relative_margin(), percent).into(),
         before.into(),
         or_dash(row.relative_change(), |change| format!("{:+.0} %", change * 100.0)).into(),
     ]

@@ -1,6 +1,7 @@
-//! Numbers and tables as text, for the terminal and the page.
+//! Numbers, tables and links as text, for the terminal and the page.
 
 use std::fmt::Display;
+use std::path::{Component, Path, PathBuf, absolute};
 
 use masseter_scenario::Dimension;
 
@@ -50,4 +51,30 @@ fn columns<const N: usize>(widths: [usize; N], cells: [impl Display; N]) -> Stri
         _ => format!(" {cell:>width$}"),
     });
     cells.collect::<String>() + "\n"
+}
+
+/// The link from a page to a file; none where the working folder is gone.
+pub(crate) fn seen_from(page: &Path, file: &Path) -> Option<String> {
+    let [page, file] = [absolute(page).ok()?, absolute(file).ok()?];
+    let folder = page.parent()?;
+    let shared = folder.components().zip(file.components()).take_while(|(a, b)| a == b).count();
+    let up = folder.components().skip(shared).map(|_| Component::ParentDir);
+    let way: PathBuf = up.chain(file.components().skip(shared)).collect();
+    Some(way.to_string_lossy().into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_linked_from_the_folder_of_the_page() {
+        for (page, file, expected) in [
+            ("suite.html", "kept/bad/report.html", "kept/bad/report.html"),
+            ("out/pages/suite.html", "kept/report.html", "../../kept/report.html"),
+            ("/a/b/suite.html", "/a/c/report.html", "../c/report.html"),
+        ] {
+            assert_eq!(seen_from(page.as_ref(), file.as_ref()).as_deref(), Some(expected));
+        }
+    }
 }

@@ -1,9 +1,9 @@
-//! The page of a campaign, drawn as the page of a run: its result, margins against factors, two factors at a time, the reasons
+//! The page of a campaign, drawn as the page of a run: its result with a histogram of margins, margins against factors, two factors at a time, the reasons
 //! of the cases that did not pass, and the worst cases.
 
 use masseter_page::{
-    Across, Block, Cell, Chart, Column, Content, LevelKind, Life, Limit, Page, PageError, Scale, Section,
-    Series, Table, Time, Tone, Verdict,
+    Across, Block, Cell, Chart, Column, Content, Dot, LevelKind, Life, Limit, Page, PageError, Scale,
+    Section, Series, Table, Time, Tone, Verdict, margin_histogram,
 };
 
 use crate::case::{CaseResult, check_names, in_order_of_appearance};
@@ -17,10 +17,15 @@ const HEIGHT: u32 = 220;
 const PAIRED: usize = 3;
 
 pub(crate) fn html(report: &Report<'_>, worst: &[WorstCase]) -> Result<String, PageError> {
-    let sections =
-        [Some(result(report)), margins(report), pairs(report), reasons(report), worst_cases(report, worst)];
+    let sections = [
+        Some(result(report)),
+        margins(report, worst),
+        pairs(report, worst),
+        reasons(report, worst),
+        worst_cases(report, worst),
+    ];
     let about = format!("{} of {} cases", report.results.len(), report.campaign.case_count());
-    let page = Page::new("campaign", Life::Finished, Time::default());
+    let page = Page::new("Campaign", Life::Finished, Time::default());
     Page { about, sections: sections.into_iter().flatten().collect(), ..page }.to_html()
 }
 
@@ -47,11 +52,15 @@ fn result(report: &Report<'_>) -> Section {
         timing_tone: Tone::Plain,
         figures: figures.map(|figure| figure.map(str::to_owned)).into_iter().chain(demanded).collect(),
     };
-    Section::new("result", "Result", vec![Block::new("verdict", Content::Verdict(verdict))])
+    let margins: Vec<_> = report.results.iter().filter_map(|result| Some(result.least_margin()?.1)).collect();
+    let histogram = margin_histogram("Cases by their smallest margin", "case", &margins);
+    let histogram = histogram.map(|chart| Block::chart("smallest-margins", chart));
+    let verdict = Block::new("verdict", Content::Verdict(verdict));
+    Section::new("result", "Result", [verdict].into_iter().chain(histogram).collect())
 }
 
 /// A plot for every check with a margin and every factor.
-fn margins(report: &Report<'_>) -> Option<Section> {
+fn margins(report: &Report<'_>, worst: &[WorstCase]) -> Option<Section> {
     let axes: Vec<_> = (0..report.campaign.file.factors.len()).map(|at| Quantity::of(report, at)).collect();
     let drawn = |check: &String| {
         let margin = |result: &CaseResult| {
@@ -62,7 +71,7 @@ fn margins(report: &Report<'_>) -> Option<Section> {
         let axes = axes.iter().enumerate().filter(move |_| has_margin);
         let title = format!("Margin of {check}");
         let chart = |(at, axis): (usize, &Quantity)| {
-            let dots = series(report, |result| Some((axis.place(result)?, margin(result)?)));
+            let dots = series(report, worst, |result| Some((axis.place(result)?, margin(result)?)));
             let fails = Limit { name: "fails below".to_owned(), kind: LevelKind::Limit, values: vec![0.0] };
             let chart = Chart { limits: vec![fails], ..chart(&title, "% of its limit", axis, dots) };
             Block::chart(format!("margin-{check}-{at}"), chart).half()
@@ -74,7 +83,7 @@ fn margins(report: &Report<'_>) -> Option<Section> {
 }
 
 /// The verdicts over two factors at a time.
-fn pairs(report: &Report<'_>) -> Option<Section> {
+fn pairs(report: &Report<'_>, worst: &[WorstCase]) -> Option<Section> {
     let factors = most_influential(report, PAIRED);
     let pairs = factors
         .iter()
@@ -82,7 +91,7 @@ fn pairs(report: &Report<'_>) -> Option<Section> {
         .flat_map(|(at, &one)| factors[at + 1..].iter().map(move |&other| [one, other]));
     let plots = pairs.map(|pair| {
         let [across, up] = pair.map(|factor| Quantity::of(report, factor));
-        let dots = series(report, |result| Some((across.place(result)?, up.place(result)?)));
+        let dots = series(report, worst, |result| Some((across.place(result)?, up.place(result)?)));
         let chart = Chart { scale: up.scale.clone(), ..chart(&up.label, "", &across, dots) };
         Block::chart(format!("pair-{}-{}", pair[0], pair[1]), chart).half()
     });
@@ -93,7 +102,7 @@ fn pairs(report: &Report<'_>) -> Option<Section> {
 }
 
 /// Equal reasons are counted. Figures in them differ from case to case, and do not tell reasons apart.
-fn reasons(report: &Report<'_>) -> Option<Section> {
+fn reasons(report: &Report<'_>, worst: &[WorstCase]) -> Option<Section> {
     let others = || report.worst(usize::MAX).into_iter().filter(|result| !result.has_passed());
     let kinds = in_order_of_appearance(others().map(kind));
     let mut groups: Vec<Vec<&CaseResult>> =
@@ -105,7 +114,7 @@ fn reasons(report: &Report<'_>) -> Option<Section> {
             mark(first),
             group.len().to_string().into(),
             first.reason.clone().into(),
-            Cell::Link { text: format!("case {}", first.number), href: format!("cases/{}/", first.id) },
+            Cell::Link { text: format!("case {}", first.number), href: link(first, worst) },
         ]
     });
     let columns =
@@ -123,21 +132,24 @@ fn kind(result: &CaseResult) -> (String, String) {
     (result.word.clone(), words.collect::<Vec<_>>().join(" "))
 }
 
+/// The report of a case that was recorded, else its result.
+fn link(result: &CaseResult, worst: &[WorstCase]) -> String {
+    let recorded = worst.iter().find(|kept| kept.number == result.number).and_then(|kept| kept.run.as_ref());
+    let name = recorded.and_then(|run| run.file_name());
+    name.map_or_else(
+        || format!("cases/{}/result.json", result.id),
+        |name| format!("worst/{}/report.html", name.to_string_lossy()),
+    )
+}
+
 fn worst_cases(report: &Report<'_>, worst: &[WorstCase]) -> Option<Section> {
     let rows: Vec<_> = worst
         .iter()
         .filter_map(|kept| {
             let result = report.results.iter().find(|result| result.number == kept.number)?;
-            let run = kept
-                .run
-                .as_ref()
-                .and_then(|run| Some(format!("worst/{}/report.html", run.file_name()?.to_string_lossy())));
             let margin = result.least_margin();
             Some([
-                run.map_or_else(
-                    || result.number.to_string().into(),
-                    |href| Cell::Link { text: result.number.to_string(), href },
-                ),
+                Cell::Link { text: result.number.to_string(), href: link(result, worst) },
                 mark(result),
                 margin
                     .map_or_else(|| "–".to_owned(), |(name, margin)| format!("{}, {name}", percent(margin)))
@@ -148,7 +160,7 @@ fn worst_cases(report: &Report<'_>, worst: &[WorstCase]) -> Option<Section> {
         })
         .collect();
     let columns = Column::texts(&["case", "verdict", "smallest margin", "factors", "again"]);
-    let table = Table::new("Worst cases", [columns], rows.clone());
+    let table = Table::new("Table of the worst cases", [columns], rows.clone());
     (!rows.is_empty()).then(|| Section::new("worst", "Worst cases", vec![Block::table("worst-cases", table)]))
 }
 
@@ -213,7 +225,11 @@ fn chart(title: &str, unit: &str, across: &Quantity, series: Vec<Series>) -> Cha
 }
 
 /// The cases as dots. Those that did not pass are drawn last, above the others.
-fn series(report: &Report<'_>, place: impl Fn(&CaseResult) -> Option<(f64, f64)>) -> Vec<Series> {
+fn series(
+    report: &Report<'_>,
+    worst: &[WorstCase],
+    place: impl Fn(&CaseResult) -> Option<(f64, f64)>,
+) -> Vec<Series> {
     type Belongs = fn(&CaseResult) -> bool;
     let kinds: [(&str, usize, Belongs); 3] = [
         ("passed", 0, CaseResult::has_passed),
@@ -227,10 +243,14 @@ fn series(report: &Report<'_>, place: impl Fn(&CaseResult) -> Option<(f64, f64)>
                 .least_margin()
                 .map_or_else(String::new, |(_, margin)| format!(", margin {}", percent(margin)));
             let (x, y) = place(result)?;
-            Some(((digits(x), digits(y)), format!("case {}, {}{margin}", result.number, result.word)))
+            Some(Dot {
+                at: (digits(x), digits(y)),
+                name: format!("case {}, {}{margin}", result.number, result.word),
+                link: link(result, worst),
+            })
         };
         let mut dots: Vec<_> = of.filter_map(dot).collect();
-        dots.sort_by(|a, b| a.0.0.total_cmp(&b.0.0));
+        dots.sort_by(|a, b| a.at.0.total_cmp(&b.at.0));
         Series::dots(name, dots).coloured(colour)
     });
     all.into_iter().filter(|series| !series.names.is_empty()).collect()

@@ -59,7 +59,7 @@ fn in_condition<'a>(study: &'a Study, condition: &'a str) -> impl Iterator<Item 
 }
 
 /// Mean and standard deviation of the recordings' mean courses; of a single recording, of its cycles.
-fn band(study: &Study, group: &str, condition: &str) -> Vec<[CoursePoint; 2]> {
+pub(super) fn band(study: &Study, group: &str, condition: &str) -> Vec<[CoursePoint; 2]> {
     let groups = in_condition(study, condition).flat_map(|recorded| recorded.jaw.groups.iter());
     let courses: Vec<_> = groups
         .filter(|of| of.name == group && !of.mean_course.is_empty())
@@ -75,13 +75,18 @@ fn band(study: &Study, group: &str, condition: &str) -> Vec<[CoursePoint; 2]> {
     }
 }
 
+/// The share of the cycle at a point of a course, %.
+pub(super) fn percent(point: usize) -> f64 {
+    100.0 * point as f64 / (COURSE_POINTS - 1) as f64
+}
+
 /// Mean ± SD of a coordinate over the cycle, in each condition.
 fn course(study: &Study, group: &str, label: &str, of: fn(&CoursePoint) -> f64) -> Chart {
-    let at = |point: usize| 100.0 * point as f64 / (COURSE_POINTS - 1) as f64;
     let [mut areas, mut lines] = [Vec::new(), Vec::new()];
     for (condition, colour) in study.conditions().into_iter().zip(COLOURS.into_iter().cycle()) {
         let band = band(study, group, condition);
-        let edge = |sign: f64, point: usize| (at(point), of(&band[point][0]) + sign * of(&band[point][1]));
+        let edge =
+            |sign: f64, point: usize| (percent(point), of(&band[point][0]) + sign * of(&band[point][1]));
         let upper = (0..band.len()).map(|point| edge(1.0, point));
         let lower = (0..band.len()).rev().map(|point| edge(-1.0, point));
         let area = upper.chain(lower).collect();

@@ -4,6 +4,7 @@
 
 mod figures;
 mod output;
+mod page;
 #[cfg(test)]
 mod tests;
 

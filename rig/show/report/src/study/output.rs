@@ -6,11 +6,11 @@ use std::path::Path;
 
 use anyhow::Context;
 use masseter_judge::{COURSE_POINTS, Statistic};
-use masseter_page::{Block, Column, Content, Life, Page, Section, Table as PageTable, Time};
 use masseter_scenario::wording::counted;
 use masseter_table::{Cell, Column as TableColumn, Format, Table, write_table};
 
-use super::figures::{Figure, figures, groups};
+use super::figures::{figures, groups};
+use super::page::html;
 use super::{Difference, Measure, Study, means};
 use crate::jaw_table::{jaw_cycle_table, number, recording_cells, recording_columns, whole, word, words};
 use crate::text::{self, or_dash, significant};
@@ -43,7 +43,7 @@ pub fn write(study: &Study, folder: &Path, format: &Format) -> anyhow::Result<St
     };
     figures.iter().try_for_each(|figure| write(&figure.name, &figure.svg))?;
     write("caption.txt", &caption)?;
-    write("compare.html", &page(study, &differences, figures, &caption)?)?;
+    write("compare.html", &html(study, &differences, figures, &caption)?)?;
     Ok(in_words(study, &differences))
 }
 
@@ -181,7 +181,9 @@ fn interval(of: &Statistic) -> String {
     or_dash(ends, |(low, high)| format!("{} to {}", significant(low), significant(high)))
 }
 
-fn difference_cells(Difference { measure, from, to, statistic, effect }: &Difference) -> [String; 8] {
+pub(super) fn difference_cells(
+    Difference { measure, from, to, statistic, effect }: &Difference,
+) -> [String; 8] {
     [
         measure.group.clone(),
         format!("{}, {}", measure.of.about, measure.of.unit),
@@ -192,51 +194,6 @@ fn difference_cells(Difference { measure, from, to, statistic, effect }: &Differ
         or_dash(*effect, |g| format!("{g:.2}")),
         statistic.count.to_string(),
     ]
-}
-
-fn page(
-    study: &Study,
-    differences: &[Difference],
-    figures: Vec<Figure>,
-    caption: &str,
-) -> anyhow::Result<String> {
-    let table = |id: &str, label: &str, titles: [Vec<Column>; 2], rows: Vec<Vec<String>>| {
-        Block::table(id, PageTable::new(label, titles, rows))
-    };
-    let rows = differences.iter().map(|difference| difference_cells(difference).to_vec()).collect();
-    let titles = [
-        Column::texts(&["cycles", "quantity", "condition"]),
-        Column::numbers(&["difference", "95 % interval", "SD", "Hedges' g", "pairs"]),
-    ];
-    let mut first = vec![Block::text("caption", caption)];
-    first.push(table("differences", "Differences within persons", titles, rows));
-    let recordings = study.recordings.iter().map(|of| {
-        let open = or_dash(of.jaw.most_closed_mm, |open_mm| format!("{:.1}", open_mm.max(0.0)));
-        let kinds = of.jaw.groups.iter().map(|group| format!("{} {}", group.count, group.name));
-        let kinds = kinds.collect::<Vec<_>>().join(", ");
-        let counts = [of.jaw.left_out, of.jaw.unclear].map(|count| count.to_string());
-        [&of.person, &of.condition, &of.verdict, &kinds]
-            .map(String::clone)
-            .into_iter()
-            .chain(counts)
-            .chain([open])
-            .collect()
-    });
-    let titles = [
-        Column::texts(&["person", "condition", "rig", "cycles that count"]),
-        Column::numbers(&["left out", "unclear", "most closed, mm open"]),
-    ];
-    let recordings = table("recordings", "Recordings", titles, recordings.collect());
-    let drawn = figures.into_iter().map(|Figure { name, svg }| Block::new(name, Content::Figure(svg)));
-    let sections = vec![
-        Section::new("differences", "Differences", first),
-        Section::new("figures", "Figures", drawn.collect()),
-        Section::new("recordings", "Recordings", vec![recordings]),
-    ];
-    let about =
-        format!("{} recordings by {} and {}", study.recordings.len(), study.by.person, study.by.condition);
-    let page = Page { about, sections, ..Page::new("Jaw motion compared", Life::Finished, Time::default()) };
-    Ok(page.to_html()?)
 }
 
 /// The differences that a terminal shows, a line each.

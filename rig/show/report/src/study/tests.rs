@@ -122,3 +122,10 @@ fn a_figure_is_as_wide_as_a_column_and_shows_each_condition() {
         assert!(["before", "after"].iter().all(|condition| figure.svg.contains(condition)));
     }
 }
+
+#[test]
+fn the_page_draws_each_condition_for_the_screen_beside_the_figures_for_print() {
+    let study = study();
+    let html = page::html(&study, &study.differences(), figures::figures(&study), "made up").unwrap();
+    assert!(html.contains("after, mean + SD") && html.contains("\"kind\":\"figure\""), "{html}");
+}

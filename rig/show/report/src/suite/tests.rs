@@ -64,7 +64,7 @@ fn warnings_of_the_plan_are_in_every_form_also_where_results_differ() {
         assert!(xml.contains(property), "{xml}");
         let json: Value = serde_json::from_str(&report.to_json().unwrap()).unwrap();
         assert_eq!(json["scenarios"][0]["warnings"][1], "a row jumps");
-        let html = html_of_suite(&report).unwrap();
+        let html = html_of_suite(&report, "suite.html".as_ref()).unwrap();
         assert!(html.contains("warning in one: a row jumps"), "{html}");
     }
     let silent = junit_of_suite(&report(vec![tested("one", vec![passed(1.0)])], None)).unwrap();
@@ -140,7 +140,7 @@ fn the_json_is_the_baseline_of_a_later_run() {
     assert_eq!((&row["margin"], &row["before"]["margin"]), (&0.5.into(), &1.0.into()));
     assert_eq!((&json["result"], &json["unrun"][0]), (&"INTERRUPTED".into(), &"last".into()));
     assert_eq!(json["scenarios"][0]["attempts"][0]["word"], "PASS");
-    let html = html_of_suite(&now).unwrap();
+    let html = html_of_suite(&now, "suite.html".as_ref()).unwrap();
     assert!(["REQ-12", "b.TOML", "-50 %"].iter().all(|text| html.contains(text)));
 
     std::fs::write(&path, "{\"form\": 2, \"requirements\": []}").unwrap();
