@@ -188,8 +188,7 @@
       drawing.append(...grid(), svg('g', { 'clip-path': `url(#${clip})` }, ...shades(), ...near.map(level), ...shown.map(curve)), ...near.map(levelName));
       drawing.append(...moments.map(mark), svg('g', { class: 'cursor' }));
       words.textContent = [beyond.length ? `Not in the picture: ${beyond.map(inWords).join('; ')}.` : '',
-        data.is_shaded ? 'Judged: the shaded stretches.' : '', isBanded ? 'Too dense for lines: bands from the lowest to the highest values. Zoom in for the curves.' : '',
-        hasLinks ? 'A click on a dot opens its case.' : ''].filter(Boolean).join(' ');
+        data.is_shaded ? 'Judged: the shaded stretches.' : '', isBanded ? 'Too dense for lines: bands from the lowest to the highest values. Zoom in for the curves.' : ''].filter(Boolean).join(' ');
       moveCursor();
     }
 

@@ -106,33 +106,41 @@ fn scenario_row(tested: &TestedScenario, file: &Path) -> [Cell; 6] {
 fn requirements(report: &SuiteReport) -> Option<Section> {
     let mut rows = report.requirements();
     rows.sort_by_key(|row| row.check.result != CheckResult::Failed);
-    let rows: Vec<_> = rows.iter().map(requirement_row).collect();
-    if rows.is_empty() {
-        return None;
-    }
+    let has_baseline = report.baseline.is_some();
+    let trend = if has_baseline { Column::numbers(&["before", "change"]) } else { Vec::new() };
     let columns = [
         Column::texts(&["id", "requirement", "scenario", "result"]),
-        Column::numbers(&["margin", "of the limit", "before", "change"]),
+        Column::numbers(&["margin", "of the limit"]),
+        trend,
     ];
-    let table = Table::new("Table of requirements by scenario", columns, rows);
-    Some(Section::new("requirements", "Requirements", vec![Block::table("requirements", table)]))
+    let cells = rows.iter().map(|row| {
+        let trend = has_baseline.then(|| trend_cells(row));
+        requirement_cells(row).into_iter().chain(trend.into_iter().flatten())
+    });
+    let table = Table::new("Table of requirements by scenario", columns, cells);
+    let section = || Section::new("requirements", "Requirements", vec![Block::table("requirements", table)]);
+    (!rows.is_empty()).then(section)
 }
 
-fn requirement_row(row: &RequirementRow<'_>) -> [Cell; 8] {
-    let in_unit = |margin: f64| format!("{} {}", significant(margin), row.unit()).trim_end().to_owned();
-    let percent = |share: f64| format!("{:.0} %", share * 100.0);
-    let before = match row.before {
-        Some(before) if before.margin.is_none() => before.result.clone(),
-        before => or_dash(before.and_then(|before| before.margin), in_unit),
-    };
+fn requirement_cells(row: &RequirementRow<'_>) -> [Cell; 6] {
     [
         or_dash(row.check.id.as_ref(), Clone::clone).into(),
         row.check.name.to_string().into(),
         row.scenario.into(),
         mark(row.check.result),
-        or_dash(row.margin(), in_unit).into(),
-        or_dash(row.relative_margin(), percent).into(),
-        before.into(),
-        or_dash(row.relative_change(), |change| format!("{:+.0} %", change * 100.0)).into(),
+        or_dash(row.margin(), |margin| in_unit(row, margin)).into(),
+        or_dash(row.relative_margin(), |share| format!("{:.0} %", share * 100.0)).into(),
     ]
+}
+
+fn trend_cells(row: &RequirementRow<'_>) -> [Cell; 2] {
+    let before = match row.before {
+        Some(before) if before.margin.is_none() => before.result.clone(),
+        before => or_dash(before.and_then(|before| before.margin), |margin| in_unit(row, margin)),
+    };
+    [before.into(), or_dash(row.relative_change(), |change| format!("{:+.0} %", change * 100.0)).into()]
+}
+
+fn in_unit(row: &RequirementRow<'_>, margin: f64) -> String {
+    format!("{} {}", significant(margin), row.unit()).trim_end().to_owned()
 }

@@ -78,8 +78,10 @@ fn margins(report: &Report<'_>, worst: &[WorstCase]) -> Option<Section> {
         };
         axes.map(chart).collect::<Vec<_>>()
     };
-    let blocks: Vec<_> = check_names(&report.results).iter().flat_map(drawn).collect();
-    (!blocks.is_empty()).then(|| Section::new("margins", "Margin against each factor", blocks))
+    let plots: Vec<_> = check_names(&report.results).iter().flat_map(drawn).collect();
+    let about = Block::text("margins-about", "A dot is a case. A click opens its report, or its result where no run was recorded.");
+    let blocks: Vec<_> = [about].into_iter().chain(plots).collect();
+    (blocks.len() > 1).then(|| Section::new("margins", "Margin against each factor", blocks))
 }
 
 /// The verdicts over two factors at a time.
@@ -96,7 +98,7 @@ fn pairs(report: &Report<'_>, worst: &[WorstCase]) -> Option<Section> {
         Block::chart(format!("pair-{}-{}", pair[0], pair[1]), chart).half()
     });
     let plots: Vec<_> = plots.collect();
-    let about = "The factors that move the smallest margin most, two at a time. A dot is a case.";
+    let about = "The factors that move the smallest margin most, two at a time.";
     let blocks: Vec<_> = [Block::text("pairs-about", about)].into_iter().chain(plots).collect();
     (blocks.len() > 1).then(|| Section::new("pairs", "Two factors at a time", blocks))
 }
