@@ -1,7 +1,9 @@
 """Judges the paper's claims by the tables of a study, and draws its figures: python scripts/study.py FOLDER
 
-FOLDER is what `masseter-research study --out FOLDER` writes; claims.md and the figures go there. The same tables give the same bytes.
+FOLDER is what `masseter-research study --out FOLDER` writes; study.html and the figures go there. The same tables give the same bytes.
 """
+import json
+import re
 import sys
 from pathlib import Path
 
@@ -20,6 +22,8 @@ import matplotlib.pyplot as plt  # noqa: E402
 from matplotlib.colors import ListedColormap  # noqa: E402
 
 FOLDER = Path(sys.argv[1])
+# What the page of a run is made of.
+PAGE = Path(__file__).parents[1] / "rig/show/page"
 # Okabe and Ito's colours.
 BLUE, VERMILION, GREEN, PURPLE, ORANGE, SKY, GREY = (
     "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#999999")
@@ -310,16 +314,16 @@ def pressure() -> None:
     save(figure, "pressure")
 
 
-def reach() -> str:
+def reach() -> list[list]:
     """Rows of the lowest and the highest value of each axis of a map at which the mechanism can be."""
     rows = []
     for name in ("x_z", "y_z", "roll_pitch", "yaw_pitch"):
         cells = table(f"workspace_{name}")
         reached = cells[cells.determinant.notna()]
         for axis in cells.columns[:2]:
-            ends = f"{reached[axis].min():.1f} | {reached[axis].max():.1f}" if len(reached) else "– | –"
-            rows.append(f"| [workspace_{name}](workspace_{name}.csv) | {COORDINATES[axis]} | {ends} |")
-    return "\n".join(rows)
+            ends = [f"{reached[axis].min():.1f}", f"{reached[axis].max():.1f}"] if len(reached) else ["–", "–"]
+            rows.append([{"text": f"workspace_{name}", "href": f"workspace_{name}.csv"}, COORDINATES[axis], *ends])
+    return rows
 
 
 def captions() -> dict:
@@ -365,44 +369,52 @@ def captions() -> dict:
     }
 
 
-def page(claims: list) -> str:
+def table_block(name: str, label: str, texts: list[str], numbers: list[str], rows: list[list]) -> dict:
+    columns = [{"title": title, "is_number": title in numbers} for title in [*texts, *numbers]]
+    return {"id": name, "kind": "table", "data": {"label": label, "columns": columns, "rows": rows}}
+
+
+def sections(claims: list) -> list[dict]:
     settings = table("settings").iloc[0]
-    figure = lambda claim: f" ([figure](#{claim.figure}))" if claim.figure else ""
-    rows = [f"| {number} | {claim.statement} | {claim.section} | {claim.measured}{figure(claim)} | {claim.criterion} | "
-            f"**{claim.verdict}** |" for number, claim in enumerate(claims, 1)]
-    figures = "\n".join(f'<a id="{name}"></a>\n\n![{name}]({name}.svg)\n\n{caption}\n' for name, caption in captions().items())
-    return f"""# The paper's claims beside what was measured
+    text = lambda name, words: {"id": name, "kind": "text", "data": words}
+    tone = {"holds": "good", "holds partly": "doubtful", "does not hold": "bad"}
+    figure = lambda claim: {"text": claim.figure, "href": f"#{claim.figure}.svg"} if claim.figure else ""
+    rows = [[str(number), claim.statement, claim.section, claim.measured, claim.criterion,
+             {"mark": claim.verdict, "tone": tone[claim.verdict]}, figure(claim)] for number, claim in enumerate(claims, 1)]
+    return [
+        {"id": "claims", "title": "Claims", "blocks": [
+            text("about", "The paper describes the 6-DOF mastication mechanism and its forward kinematics. `published` below is its solver as "
+                 "printed: residuals are distances, and the increment is halved until the error decreases, with at most 100 iterations "
+                 f"and 40 halvings. From above the base: {settings.samples} random inputs with one true solution, each with a random "
+                 "guess of leg angles between 0° and 180°. Verdicts follow from the figures of this run by the criterion beside them."),
+            text("again", f"To repeat it: `{settings.command}`. Only times differ from run to run."),
+            table_block("claims", "Table of claims", ["#", "the paper's claim", "where", "measured", "criterion", "verdict", "figure"], [], rows)]},
+        {"id": "workspace", "title": "Workspace", "blocks": [
+            text("reach-about", "Reach within the strokes, the other coordinates as at the neutral pose. Not measured: what the paper says "
+                 "of the Stewart platform and genetic algorithms."),
+            table_block("reach", "Table of the reach", ["map", "coordinate"], ["from", "to"], reach())]},
+        {"id": "figures", "title": "Figures", "blocks": [
+            block for name, caption in captions().items()
+            for block in ({"id": f"{name}.svg", "kind": "figure", "data": (FOLDER / f"{name}.svg").read_text()}, text(f"about-{name}", caption))]},
+    ]
 
-The paper describes the 6-DOF mastication mechanism and its forward kinematics; `published` below is its solver as printed \
-(residuals are distances, the increment is halved until the error decreases), with at most 100 iterations and 40 halvings. \
-*From above the base*: {settings.samples} random inputs with one true solution, each with a random guess of leg angles between 0° \
-and 180°. Verdicts follow from the figures of this run by the criterion beside them.
 
-Masseter {settings.version}, random numbers from seed {settings.seed}. To repeat it:
-
-    {settings.command}
-
-Only times differ from run to run.
-
-| # | The paper's claim | Where | Measured | Criterion | Verdict |
-| --- | --- | --- | --- | --- | --- |
-{chr(10).join(rows)}
-
-## Workspace
-
-Reach within the strokes, the other coordinates as at the neutral pose:
-
-| map | coordinate | from | to |
-| --- | --- | --- | --- |
-{reach()}
-
-Not measured: what the paper says of the Stewart platform and genetic algorithms.
-
-{figures}"""
+def page(claims: list) -> str:
+    """The page of a run's report with this content."""
+    settings = table("settings").iloc[0]
+    data = {"title": "The paper's claims beside what was measured", "life": "finished", "moments": [], "phases": [],
+            "about": f"Masseter {settings.version}, random numbers from seed {settings.seed}",
+            "time": {"motion_s": None, "end_s": 0, "period_s": 0.001, "wall_s": None}, "sections": sections(claims)}
+    scripts = re.findall(r'include_str!\("\.\./assets/(\w+\.js)"\)', (PAGE / "src/page.rs").read_text())
+    asset = lambda name: (PAGE / "assets" / name).read_text()
+    parts = {"title": data["title"], "style|safe": asset("style.css"), "script|safe": "".join(map(asset, scripts)),
+             # No text can end the element that holds the data.
+             "data|safe": json.dumps(data, ensure_ascii=False).replace("<", "\\u003c")}
+    template = (PAGE / "templates/page.html").read_text()
+    return re.sub(r"\{\{ ([\w|]+) \}\}", lambda part: parts[part[1]], template)
 
 
 claims = judged(FOLDER)
-(FOLDER / "claims.md").write_text(page(claims))
 for claim in claims:
     print(f"{claim.verdict:<13}  {claim.statement}")
 speed()
@@ -418,3 +430,5 @@ for name, (maps, _, column, label, _) in WORKSPACES.items():
 forces()
 bites()
 pressure()
+# The page holds the figures.
+(FOLDER / "study.html").write_text(page(claims))

@@ -1,5 +1,5 @@
 """The paper's claims, judged by the tables of a study. The criteria are defined here alone; each is a function of measured values,
-so that other values give another judgement. scripts/study.py writes them as claims.md.
+so that other values give another judgement. scripts/study.py writes them into study.html.
 """
 from dataclasses import dataclass
 from math import sqrt

@@ -3,6 +3,7 @@
 A figure has data and text, and all of it lies on the page: a coordinate that is no number, or a mark beside the page, fails. The
 same tables give the same bytes.
 """
+import json
 import re
 import subprocess
 import sys
@@ -39,23 +40,25 @@ assert [str(one) for one in (Share(9999, 10_000), Share(10, 10), Share(1, 10_000
 
 def made() -> dict:
     subprocess.run([sys.executable, SCRIPTS / "study.py", study], check=True, stdout=subprocess.PIPE)
-    return {path.name: path.read_text() for path in study.iterdir() if path.suffix in (".svg", ".md")}
+    return {path.name: path.read_text() for path in study.iterdir() if path.suffix in (".svg", ".html")}
 
 
 files = made()
 assert made() == files, "the same tables give other bytes"
-page = files.pop("claims.md")
-claims = {cells[2].strip(): cells[6].strip(" *") for cells in (line.split("|") for line in page.splitlines()) if len(cells) == 8}
-claims.pop("The paper's claim"), claims.pop("---")
-assert len(claims) == 18 and set(claims.values()) <= {HOLDS, PARTLY, NOT} and not re.search(r"\bnan\b", page), claims
+page = files.pop("study.html")
+data = json.loads(re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)[1])
+blocks = {block["id"]: block for section in data["sections"] for block in section["blocks"]}
+claims = {row[1]: row[5]["mark"] for row in blocks["claims"]["data"]["rows"]}
+assert len(claims) == 18 and set(claims.values()) <= {HOLDS, PARTLY, NOT} and "nan" not in str(blocks["claims"]), claims
+assert all(row[6] == "" or row[6]["href"].removeprefix("#") in blocks for row in blocks["claims"]["data"]["rows"])
 # Whatever this sample gives: these follow from the mechanism.
 verdict = lambda part: next(verdict for claim, verdict in claims.items() if part in claim)
 assert verdict("10⁻¹⁰ s on a Pentium") == NOT and verdict("whatever the initial guess") != HOLDS
 assert verdict("A₁ has two positions") == HOLDS and verdict("several sets of leg angles") == HOLDS
 assert "66.04°" in page, "the folded corner is the one of the paper"
 
-shown = re.findall(r"!\[(\w+)\]\((\1\.svg)\)", page)
-assert len(shown) == 16 and sorted(file for _, file in shown) == sorted(files), (shown, sorted(files))
+shown = {name: block["data"] for name, block in blocks.items() if block["kind"] == "figure"}
+assert len(shown) == 16 and shown == files, (sorted(shown), sorted(files))
 for name, text in files.items():
     assert not re.search(r'"[^"]*\bnan\b', text), name
     svg = ElementTree.fromstring(text)

@@ -33,15 +33,16 @@ fn result(report: &SuiteReport) -> Section {
         (!report.left_out.is_empty()).then(|| format!("left out: {}", report.left_out.join(", "))),
         report.trend_in_words(),
     ];
+    let tone = match (report.tested.iter().any(TestedScenario::is_short), report.unrun.is_empty()) {
+        (true, _) => Tone::Bad,
+        (false, true) => Tone::Good,
+        (false, false) => Tone::Doubtful,
+    };
     let verdict = Verdict {
         word: report.word().to_owned(),
         reason: reasons.into_iter().flatten().collect::<Vec<_>>().join("; "),
         next: None,
-        tone: if !report.unrun.is_empty() {
-            Tone::Doubtful
-        } else {
-            tone(report.tested.iter().all(|tested| !tested.is_short()))
-        },
+        tone,
         timing: "simulated".to_owned(),
         timing_reason: String::new(),
         timing_tone: Tone::Plain,
@@ -71,10 +72,6 @@ fn scenarios(report: &SuiteReport, file: &Path) -> Section {
         tested.into_iter().map(|tested| scenario_row(tested, file)),
     );
     Section::new("scenarios", "Scenarios", vec![Block::table("scenarios", table)])
-}
-
-fn tone(is_good: bool) -> Tone {
-    if is_good { Tone::Good } else { Tone::Bad }
 }
 
 /// The report of the last run that was kept, seen from the page.
