@@ -52,7 +52,7 @@ fn the_crate_of_drives_stands_on_that_of_can_alone() {
 
 #[test]
 fn the_command_and_its_bindings_share_the_compiled_crates_of_others() {
-    for binding in ["masseter-c", "masseter-python"] {
+    for binding in ["masseter-c", "masseter-drives-python", "masseter-python"] {
         let differing = other_features(project(), binding);
         assert!(
             differing.is_empty(),

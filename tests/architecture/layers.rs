@@ -7,7 +7,7 @@ use super::workspace::{crate_roots, list, metadata, text, within};
 
 /// The crates of the workspace that each crate may use, all by their folders. The root package may use all
 /// but the programs that a run does not need.
-const MAY_USE: [(&str, &[&str]); 28] = [
+const MAY_USE: [(&str, &[&str]); 29] = [
     ("shared/can", &[]),
     ("shared/model", &[]),
     ("shared/scenario", &["shared/can", "shared/model"]),
@@ -18,6 +18,7 @@ const MAY_USE: [(&str, &[&str]); 28] = [
     ("shared/no_bindgen", &[]),
     ("controller", &["shared/can", "shared/model", "shared/scenario", "shared/runtime"]),
     ("rig/bindings/c", &["shared/model", "shared/runtime", "shared/scenario", "controller"]),
+    ("rig/bindings/drives", &["shared/can", "plant/drives"]),
     (
         "rig/bindings/python",
         &[

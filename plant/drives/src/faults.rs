@@ -1,7 +1,8 @@
 //! The injectable faults of a drive. The injector sets the acting faults, and asks for the faults that have struck.
 
 /// A kind of fault. A kind with a size has it in its own unit.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum DriveFault {
     /// The logic supply is too low.
     Fault,

@@ -25,7 +25,7 @@ pub use node::DriveNode;
 pub use quirks::Quirk;
 pub use ratings::Ratings;
 pub use settings::{DriveSettings, Identity, SettingsError};
-pub use stand::{Mass, Stand};
+pub use stand::{Encoder, Mass, Stand};
 pub use table::{Access, DataType, Entry, INCREMENTS_PER_TURN, Mapping, PDOS};
 
 /// Nanoseconds of a millisecond and of a second.

@@ -1,14 +1,17 @@
 //! Deviations of a drive from the standard, as real drives have them, and what each changes.
 
 use masseter_can::canopen::{AbortCode, CobId, ObjectAddress};
-use serde::{Deserialize, Serialize};
+use serde::de::Error;
+use serde::{Deserialize, Deserializer, Serialize};
 
 use crate::dictionary::{Objects, Overlay, find};
 use crate::names;
 use crate::table::{PDOS, RPM_PER_S};
 
-/// A deviation from the standard.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A deviation from the standard. Its form in a file is a name such as `two_boot_ups`, or a name with values such as
+/// `{ "slow_save": { "for_s": 3 } }`: files give times in seconds.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Quirk {
     /// The PDOs are as delivered: 6040h alone in RPDO1, 6041h alone in TPDO1, transmission types 255, inhibit times 10.
     FactoryPdos,
@@ -30,13 +33,16 @@ pub enum Quirk {
     /// Saving takes time. 1010h:01 reads 0 until then, and a reset before then loses the values.
     SlowSave {
         /// The time, ns.
+        #[serde(rename = "for_s", deserialize_with = "seconds")]
         for_ns: u64,
     },
     /// The brake opens and closes late; targets count once it is open.
     SlowBrake {
         /// From "operation enabled" until the brake is open, ns.
+        #[serde(rename = "open_s", default, deserialize_with = "seconds")]
         open_ns: u64,
         /// From the loss of current until the brake is closed, ns.
+        #[serde(rename = "close_s", default, deserialize_with = "seconds")]
         close_ns: u64,
     },
     /// The axis has no brake: without power it coasts.
@@ -48,6 +54,7 @@ pub enum Quirk {
     /// Safe torque off is active at power-on: the drive stays in "switch on disabled".
     StoAtPowerOn {
         /// How long, ns; `None` for ever.
+        #[serde(rename = "for_s", default, deserialize_with = "some_seconds")]
         for_ns: Option<u64>,
     },
     /// The encoder is incremental: 6064h is 0 at power-on, wherever the axis stands.
@@ -66,6 +73,7 @@ pub enum Quirk {
     /// The drive restarts by itself once.
     Restarts {
         /// Time from power-on, ns.
+        #[serde(rename = "after_s", deserialize_with = "seconds")]
         after_ns: u64,
     },
     /// The drive goes on without the master's heartbeat, though it shows 1016h.
@@ -75,6 +83,7 @@ pub enum Quirk {
     /// Heartbeat and process data count as lost late.
     LateWatchdog {
         /// How long after their time, ns.
+        #[serde(rename = "for_s", deserialize_with = "seconds")]
         for_ns: u64,
     },
     /// A lost master takes the current away at once, and the brake stays open: the axis coasts.
@@ -96,6 +105,21 @@ pub enum Quirk {
         /// The object.
         object: ObjectAddress,
     },
+}
+
+/// The longest time of a quirk, s.
+const LONGEST_S: f64 = 1e6;
+
+/// A time of a file in ns.
+fn seconds<'de, D: Deserializer<'de>>(given: D) -> Result<u64, D::Error> {
+    let time_s = f64::deserialize(given)?;
+    let is_time = (0.0..=LONGEST_S).contains(&time_s);
+    let refusal = || D::Error::custom(format!("a time of {time_s} s; use 0 to {LONGEST_S} s"));
+    is_time.then_some((time_s * 1e9) as u64).ok_or_else(refusal)
+}
+
+fn some_seconds<'de, D: Deserializer<'de>>(given: D) -> Result<Option<u64>, D::Error> {
+    seconds(given).map(Some)
 }
 
 impl Quirk {

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 /// The abilities of a drive, and the gains of its loops. The default is a spindle drive of 500 N that counts in
 /// micrometres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Ratings {
     /// Force at 1000 ‰ of the torque objects (6077h), N.
     pub rated_force_n: f64,

@@ -62,7 +62,8 @@ pub struct DriveSettings {
 }
 
 /// What a drive reports of itself (1000h, 1018h).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]
+#[serde(default, deny_unknown_fields)]
 pub struct Identity {
     /// Device type (1000h).
     pub device_type: u32,

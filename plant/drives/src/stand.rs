@@ -1,7 +1,7 @@
 //! Drives on a simulated wire, each of which moves a mass: a test stand without a machine.
 //!
-//! The stand is a pure step function: the caller gives the time. Encoders are exact, and masses do not touch each other. A
-//! caller with mechanics of its own steps each [`DriveNode`] itself.
+//! The stand is a pure step function: the caller gives the time. Encoders have no noise, and masses do not touch each other.
+//! A caller with mechanics of its own steps each [`DriveNode`] itself.
 
 use masseter_can::canopen::Cob;
 use masseter_can::{
@@ -48,11 +48,27 @@ impl Mass {
     }
 }
 
+/// The encoder of a drive. The fields may be changed at any time.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Encoder {
+    /// How much more than the position the encoder shows, m.
+    pub error_m: f64,
+    /// The position that the encoder shows all the time, m; `None` where the encoder works.
+    pub stuck_m: Option<f64>,
+}
+
+impl Encoder {
+    fn look(self, at_m: f64) -> Look {
+        Look::exact(self.stuck_m.unwrap_or(at_m + self.error_m))
+    }
+}
+
 /// A drive with its mass.
 #[derive(Debug, Clone)]
 struct Axle {
     drive: DriveNode,
     mass: Mass,
+    encoder: Encoder,
     /// The drive's force since its last step, N.
     force_n: f64,
     moved_to_ns: u64,
@@ -68,6 +84,7 @@ impl Axle {
         Ok(Self {
             drive: DriveNode::new(settings, 0, position_m)?,
             mass: Mass { mass_kg: 0.6, load_n: 0.0, stops_m, position_m, velocity_m_s: 0.0 },
+            encoder: Encoder::default(),
             force_n: 0.0,
             moved_to_ns: 0,
             step_ns: settings.step_ns,
@@ -83,7 +100,7 @@ impl Axle {
     fn deliver(&mut self, now_ns: u64, frame: &Frame) {
         if frame.id() == CanId::from(Cob::Sync) {
             self.move_to(now_ns);
-            self.drive.take_sync(now_ns, frame, self.mass.position_m, Look::exact);
+            self.drive.take_sync(now_ns, frame, self.mass.position_m, |at_m| self.encoder.look(at_m));
         } else {
             self.drive.receive(now_ns, frame);
         }
@@ -92,7 +109,7 @@ impl Axle {
     fn step(&mut self, now_ns: u64, state: ErrorState) {
         self.move_to(now_ns);
         self.drive.set_error_state(now_ns, state);
-        self.force_n = self.drive.step(now_ns, self.mass.position_m, Look::exact);
+        self.force_n = self.drive.step(now_ns, self.mass.position_m, |at_m| self.encoder.look(at_m));
         self.drive.compare_encoders(now_ns, self.mass.position_m);
         self.next_step_ns += self.step_ns;
     }
@@ -134,7 +151,7 @@ impl Stand {
     /// [`SettingsError`].
     ///
     /// # Panics
-    /// With more than 63 drives, which one wire does not carry.
+    /// With more than 127 drives, which one wire does not carry.
     pub fn new(settings: &[DriveSettings]) -> Result<Self, SettingsError> {
         let wire = VirtualWire::new(&WireConfig {
             bitrate: Bitrate::MAX,
@@ -178,6 +195,14 @@ impl Stand {
     /// Where there is no such drive.
     pub fn mass(&mut self, place: usize) -> &mut Mass {
         &mut self.axles[place].mass
+    }
+
+    /// The encoder of a drive.
+    ///
+    /// # Panics
+    /// Where there is no such drive.
+    pub fn encoder(&mut self, place: usize) -> &mut Encoder {
+        &mut self.axles[place].encoder
     }
 
     /// The next frame or error on the wire up to `now_ns`, of any node.
@@ -295,6 +320,37 @@ mod tests {
         (0..50).for_each(|_| cycle(&mut other, &mut other_ns, &mut other_words, 152_000));
         assert_eq!(stand.mass(0), other.mass(0));
         assert!((stand.mass(0).position_m - 0.152).abs() < 1e-4, "{:?}", stand.mass(0));
+    }
+
+    #[test]
+    fn an_encoder_with_an_error_leads_its_axis_away_and_a_stuck_one_is_noticed() {
+        let (mut stand, mut now_ns) = operational();
+        let mut words = [Controlword::DISABLE_VOLTAGE; 2];
+        (0..100).for_each(|_| cycle(&mut stand, &mut now_ns, &mut words, 150_000));
+        stand.encoder(0).error_m = 1e-4;
+        (0..300).for_each(|_| cycle(&mut stand, &mut now_ns, &mut words, 150_000));
+        assert!((stand.mass(0).position_m - 0.1499).abs() < 1e-5, "{:?}", stand.mass(0));
+        stand.encoder(1).stuck_m = Some(0.15);
+        // The master resets the fault at once.
+        let is_noticed = (150_000..160_000).step_by(100).any(|target| {
+            cycle(&mut stand, &mut now_ns, &mut words, target);
+            stand.drive(1).state() == DriveState::Fault
+        });
+        assert!(is_noticed, "following error");
+        assert_eq!(stand.drive(0).state(), DriveState::OperationEnabled);
+    }
+
+    #[test]
+    fn a_wire_carries_every_node_of_canopen() {
+        let settings: Vec<_> = (1..=127).map(|id| DriveSettings::new(NodeId::new(id).unwrap())).collect();
+        let mut stand = Stand::new(&settings).unwrap();
+        stand.advance(45 * MS);
+        let mut booted = 0;
+        while let Some(received) = stand.master().receive(45 * MS).unwrap() {
+            let heartbeat = Heartbeat::decode(received.frame.data()).unwrap();
+            booted += usize::from(heartbeat.state == NmtState::BootUp);
+        }
+        assert_eq!(booted, 127);
     }
 
     #[test]

@@ -85,7 +85,7 @@ impl VirtualWire {
     /// An idle wire with these faults.
     ///
     /// # Panics
-    /// With more than 64 ports.
+    /// With more than 128 ports.
     pub fn with_faults(config: &WireConfig, faults: Faults) -> Self {
         assert!(config.ports <= PortSet::CAPACITY, "{} ports", config.ports);
         Self { nodes: Nodes::new(config, faults), traffic: Traffic::Unknown, advanced_to_ns: 0, queued: 0 }

@@ -57,11 +57,11 @@ pub(super) struct Nodes {
 
 /// A set of ports.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
-pub(super) struct PortSet(u64);
+pub(super) struct PortSet(u128);
 
 impl PortSet {
     /// Ports a wire may have.
-    pub(super) const CAPACITY: usize = u64::BITS as usize;
+    pub(super) const CAPACITY: usize = u128::BITS as usize;
 
     fn contains(self, port: usize) -> bool {
         self.0 >> port & 1 == 1
@@ -73,7 +73,7 @@ impl PortSet {
 
     /// The ports behind that one.
     fn above(self, port: usize) -> Self {
-        Self(self.0 & (u64::MAX - 1) << port)
+        Self(self.0 & (u128::MAX - 1) << port)
     }
 
     fn iter(self) -> impl Iterator<Item = usize> {
