@@ -2,7 +2,9 @@
 //! is written such that it reads the same.
 
 use arbitrary::Unstructured;
-use masseter_can::canopen::{Cob, Emergency, Heartbeat, Nmt, NodeId, SdoRequest, SdoResponse};
+use masseter_can::canopen::{
+    BlockMessage, BlockSegment, Cob, Emergency, Heartbeat, Nmt, NodeId, SdoRequest, SdoResponse,
+};
 use masseter_can::socketcand::Requests;
 use masseter_can::{CanId, ErrorReport, PdoMapping, Rpdo1, Tpdo1, candump};
 use masseter_runtime::messages::tap;
@@ -28,6 +30,13 @@ fn canopen(data: &[u8]) {
     if let Ok(response) = SdoResponse::decode(data) {
         assert_eq!(SdoResponse::decode(&response.encode()), Ok(response));
         assert_nothing_invented(data, &response.encode());
+    }
+    if let Some(message) = BlockMessage::decode(data) {
+        assert_eq!(BlockMessage::decode(&message.encode()), Some(message));
+        assert_nothing_invented(data, &message.encode());
+    }
+    if let Some(segment) = BlockSegment::decode(data) {
+        assert_eq!(segment.encode(), data);
     }
     if let Ok(emergency) = Emergency::decode(data) {
         assert_eq!(emergency.encode(), data);

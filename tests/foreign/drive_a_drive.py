@@ -1,7 +1,7 @@
 """python-canopen over python-can, a foreign master, meets our emulated drives through `masseter can serve`.
 
 Boots a drive, reads and writes its objects, remaps a PDO, takes it through the CiA 402 state machine and moves its
-axis, in profile position and in cyclic synchronous position.
+axis, in profile position and in cyclic synchronous position. Transfers data in blocks, both ways.
 
 usage: drive_a_drive.py MASSETER
 """
@@ -126,6 +126,29 @@ def refused(node):
             sys.exit(f"foreign master: writing {index:04X}h was not refused")
 
 
+def blocks(node):
+    """SDO block transfer with CRC: a text, a number, and more than one block of 127 segments each way."""
+    with node.sdo.open(0x1008, 0, "rb", block_transfer=True) as name:
+        check("a text by block transfer", name.read() == node.sdo[0x1008].raw.encode())
+    data = bytes(place * 37 % 251 for place in range(1024))
+    with node.sdo.open(0x2010, 0, "wb", size=len(data), block_transfer=True) as user_data:
+        user_data.write(data)
+    with node.sdo.open(0x2010, 0, "rb", block_transfer=True) as user_data:
+        check("1024 bytes come back by block transfer", user_data.read() == data)
+    check("and in segments", node.sdo.upload(0x2010, 0) == data)
+    with node.sdo.open(0x6081, 0, "wb", size=4, block_transfer=True) as velocity:
+        velocity.write(struct.pack("<I", 50_000))
+    check("a number by block transfer", node.sdo[0x6081].raw == 50_000)
+    try:
+        with node.sdo.open(0x2010, 0, "wb", size=1025, block_transfer=True) as user_data:
+            user_data.write(bytes(1025))
+    except canopen.SdoAbortedError as abort:
+        check("too much for a block transfer aborts", abort.code == 0x06070012)
+    else:
+        sys.exit("foreign master: 1025 bytes were not refused")
+    check("which changes nothing", node.sdo.upload(0x2010, 0) == data)
+
+
 def session(masseter, port, sheet):
     network = connect(port)
     network.scanner.search(limit=10)
@@ -141,6 +164,7 @@ def session(masseter, port, sheet):
     node.nmt.wait_for_heartbeat(1)
     check("heartbeat time reads back", node.sdo[0x1017].raw == 50)
     refused(node)
+    blocks(node)
     profile_position(node)
     remap(node)
     cyclic_position(node)

@@ -121,7 +121,7 @@ impl Objects {
         let words = ENTRIES.each_ref().map(|entry| match entry.initial {
             Initial::Value(value) => value as u32,
             Initial::OfNode(base) => base + u32::from(node.get()),
-            Initial::Configured | Initial::Text(_) => 0,
+            Initial::Configured | Initial::Text(_) | Initial::Empty => 0,
         });
         Self { words }
     }

@@ -7,7 +7,7 @@ use masseter_can::canopen::NodeId;
 use crate::dictionary::{Objects, Overlay, find};
 use crate::quirks::Delivered;
 use crate::settings::{DriveSettings, SettingsError};
-use crate::table::{Access, Entry, Initial, Mapping, OBJECTS, Object, PDOS, Shape};
+use crate::table::{Access, DataType, Entry, Initial, Mapping, OBJECTS, Object, PDOS, Shape};
 
 /// Mandatory objects of CiA 301.
 const MANDATORY: [u16; 3] = [0x1000, 0x1001, 0x1018];
@@ -90,6 +90,7 @@ fn describe(entry: &Entry, objects: &Objects) -> String {
     let number = entry.kind.number(objects.at(entry.address.index, entry.address.subindex));
     let value = match entry.initial {
         Initial::Text(text) => text.to_owned(),
+        Initial::Empty => String::new(),
         Initial::OfNode(base) => format!("$NODEID+0x{base:X}"),
         _ if entry.kind.is_signed() => number.to_string(),
         _ => format!("0x{number:X}"),
@@ -97,9 +98,10 @@ fn describe(entry: &Entry, objects: &Objects) -> String {
     let limits = entry
         .limits
         .map_or_else(String::new, |(lowest, highest)| format!("LowLimit={lowest}\nHighLimit={highest}\n"));
+    let shape = if entry.kind == DataType::Domain { 0x2 } else { 0x7 };
     format!(
-        "ParameterName={name}\nObjectType=0x7\nDataType=0x{kind:04X}\nAccessType={access}\nDefaultValue={value}\n\
-         PDOMapping={mapping}\n{limits}\n"
+        "ParameterName={name}\nObjectType=0x{shape:X}\nDataType=0x{kind:04X}\nAccessType={access}\n\
+         DefaultValue={value}\nPDOMapping={mapping}\n{limits}\n"
     )
 }
 
@@ -144,12 +146,14 @@ mod tests {
             let number = |value: &Option<dcf::Value>| value.as_ref().and_then(|v| v.number(settings.node));
             let limits = entry.limits.map(|(lowest, highest)| (lowest.into(), highest.into()));
             assert_eq!(number(&read.lowest).zip(number(&read.highest)), limits, "{at}");
-            let default = read.default.as_ref().unwrap();
+            let default = read.default.as_ref();
             if let Initial::Text(text) = entry.initial {
-                assert_eq!(default, &dcf::Value::Text(text.to_owned()), "{at}");
+                assert_eq!(default, Some(&dcf::Value::Text(text.to_owned())), "{at}");
+            } else if entry.initial == Initial::Empty {
+                assert_eq!((default, read.data_type), (None, dcf::DataType::DOMAIN), "{at}");
             } else {
                 let written = objects.at(at.index, at.subindex).to_le_bytes();
-                let bytes = default.number(settings.node).unwrap().to_le_bytes();
+                let bytes = default.unwrap().number(settings.node).unwrap().to_le_bytes();
                 let length = entry.kind.bytes();
                 assert_eq!(bytes[..length], written[..length], "{at}");
             }

@@ -7,7 +7,7 @@ use masseter_can::EVERY_SYNC;
 use masseter_can::canopen::{AbortCode, CobId, ObjectAddress};
 
 use Access::{Constant, ReadOnly, ReadWrite};
-use DataType::{I8, I16, I32, Text, U8, U16, U32};
+use DataType::{Domain, I8, I16, I32, Text, U8, U16, U32};
 use Initial::{Configured, OfNode, Value};
 use Mapping::{Any, Tpdo};
 use Shape::{Array, Record};
@@ -20,6 +20,8 @@ pub(crate) const MAPPED_MAX: usize = 8;
 pub(crate) const HISTORY: usize = 8;
 /// Heartbeats that can be consumed (1016h).
 pub(crate) const CONSUMED: usize = 2;
+/// Bytes that the user data hold: more than a block of SDO.
+pub(crate) const USER_DATA_MAX: usize = 1024;
 /// 6502h: profile position, homing, cyclic synchronous position and torque.
 const SUPPORTED_MODES: i64 = 1 << 0 | 1 << 5 | 1 << 7 | 1 << 9;
 
@@ -193,6 +195,7 @@ pub(crate) static OBJECTS: &[Object] = &[
     object("TPDO 2 mapping parameter", Record, &mapping(0x1A01)),
     object("TPDO 3 mapping parameter", Record, &mapping(0x1A02)),
     object("TPDO 4 mapping parameter", Record, &mapping(0x1A03)),
+    var(&[plain(0x2010, "User data", Domain, ReadWrite, Initial::Empty)]),
     var(&[plain(0x6007, "Abort connection option code", I16, ReadWrite, Value(3)).within(0, 3)]),
     var(&[plain(0x603F, "Error code", U16, ReadOnly, Value(0)).mapped(Tpdo)]),
     var(&[plain(0x6040, "Controlword", U16, ReadWrite, Value(0)).mapped(Any)]),
@@ -271,16 +274,18 @@ pub enum DataType {
     U32 = 0x07,
     /// A constant text (VISIBLE_STRING).
     Text = 0x09,
+    /// Bytes (DOMAIN).
+    Domain = 0x0F,
 }
 
 impl DataType {
-    /// Bytes of a value; 0 for a text, whose length is its own.
+    /// Bytes of a value; 0 for a text and a domain, whose lengths are their own.
     pub const fn bytes(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,
             Self::I16 | Self::U16 => 2,
             Self::I32 | Self::U32 => 4,
-            Self::Text => 0,
+            Self::Text | Self::Domain => 0,
         }
     }
 
@@ -297,7 +302,7 @@ impl DataType {
             Self::I32 => word as i32 as i64,
             Self::U8 => word as u8 as i64,
             Self::U16 => word as u16 as i64,
-            Self::U32 | Self::Text => word as i64,
+            Self::U32 | Self::Text | Self::Domain => word as i64,
         }
     }
 }
@@ -335,6 +340,8 @@ pub(crate) enum Initial {
     Configured,
     /// This text.
     Text(&'static str),
+    /// No bytes, of a domain.
+    Empty,
 }
 
 /// An entry of an object.

@@ -3,6 +3,8 @@
 //! [`DriveNode`] sequences its parts: network management, process data, heartbeats, errors and the SDO server. Each
 //! part keeps its own state and returns the due actions. The profile (CiA 402) is the [axis](super::axis).
 
+mod access;
+mod block;
 mod pdo;
 mod sdo;
 mod state;
@@ -24,8 +26,9 @@ use crate::quirks::{Delivered, NodeQuirks};
 use crate::settings::{DriveSettings, SettingsError};
 use crate::table::PDOS;
 use crate::{MILLISECOND_NS, SECOND_NS};
+use access::{DictionaryAccess, Storage};
 use pdo::{Effects, Outbox, ProcessData, Rpdo, Tpdo};
-use sdo::{DictionaryAccess, SdoServer, Storage};
+use sdo::{Response, SdoServer};
 use state::{BOOT_NS, Consumer, Errors, Nmt, Producer, clear_history};
 
 /// The emergency of a storm: a device emergency without a lasting error (CiA 301: FFxxh).
@@ -77,6 +80,8 @@ pub struct DriveNode {
     consumer: Consumer,
     process_data: ProcessData,
     sdo: SdoServer,
+    /// The content of 2010h, which a reset of the node empties.
+    user_data: Vec<u8>,
     outbox: Outbox,
     /// Whether the supply is off.
     is_off: bool,
@@ -112,6 +117,7 @@ impl DriveNode {
             consumer: Consumer::new(&objects),
             process_data: ProcessData::new(&objects),
             sdo: SdoServer::default(),
+            user_data: Vec::new(),
             outbox: Outbox::new(),
             is_off: false,
             storm_every_s: None,
@@ -238,8 +244,8 @@ impl DriveNode {
         }
         self.storage.end_saving(now_ns, &mut self.objects);
         self.supervise_connection(now_ns);
-        if let Some(abort) = self.sdo.expire(now_ns) {
-            self.outbox.add(abort.frame(self.id));
+        if let Some(response) = self.sdo.step(now_ns) {
+            self.respond(response);
         }
         let (force_n, has_following_error) = self.axis.step(now_ns, position_m, look);
         if has_following_error {
@@ -390,6 +396,7 @@ impl DriveNode {
     fn reset_node(&mut self, now_ns: u64) {
         self.storage.saved_at_ns = None;
         self.objects = self.storage.stored.clone();
+        self.user_data.clear();
         self.errors = Errors::new(self.quirks.fault);
         self.due_fault = self.quirks.fault;
         self.axis.restart(now_ns, &self.objects);
@@ -469,6 +476,7 @@ impl DriveNode {
             now_ns,
             objects: &mut self.objects,
             storage: &mut self.storage,
+            user_data: &mut self.user_data,
             axis: &self.axis,
             overlay: &self.overlay,
             is_operational: self.nmt.is_operational(),
@@ -480,8 +488,13 @@ impl DriveNode {
             self.apply_written(object, now_ns);
         }
         if let Some(response) = answer {
-            self.outbox.add(response.frame(self.id));
+            self.respond(response);
         }
+    }
+
+    /// Sends an answer of the SDO server.
+    fn respond(&mut self, response: Response) {
+        self.outbox.add(Frame::fixed(Cob::SdoResponse(self.id).into(), response));
     }
 
     /// Applies the effect of an object written by SDO.

@@ -1,35 +1,31 @@
-//! The drive's SDO server: one transfer at a time, expedited or in segments.
+//! The drive's SDO server: one transfer at a time, expedited, in segments or in blocks.
 //!
-//! The server keeps the order of a transfer. [`DictionaryAccess`] reads and writes the entries by the rules of the
-//! standard. They cover values without a range, parameters in use, and the procedure of CiA 301 for a change of a PDO.
-//! A write only changes the dictionary. The node applies the effect on the drive, from [`DictionaryAccess::written`].
+//! The server keeps the order of a transfer. [`DictionaryAccess`] reads and writes the entries, [`block`](super::block)
+//! has the state of a block transfer.
 
-use arrayvec::ArrayVec;
 use masseter_can::canopen::{
-    AbortCode, CobId, Expedited, ObjectAddress, SdoError, SdoRequest, SdoResponse, Segment,
+    AbortCode, BlockMessage, BlockSegment, ObjectAddress, SdoError, SdoRequest, SdoResponse, Segment,
 };
 
-use super::state::consumed_node;
-use crate::axis::Axis;
-use crate::axis::modes::Homing;
-use crate::axis::motion::Mode;
-use crate::dictionary::{ENTRIES, Objects, Overlay};
-use crate::names;
-use crate::table::{Access, CONSUMED, DataType, Initial, MAPPED_MAX, Mapping, MappingEntry};
+use super::access::{DictionaryAccess, Value};
+use super::block::{BlockDownload, BlockUpload};
 
 /// Silence of a client that ends a transfer, ns.
 const TIMEOUT_NS: u64 = 1_000_000_000;
-/// The longest value that can be written.
-const WRITABLE_BYTES: usize = 4;
+
+/// The data bytes of an answer.
+pub(super) type Response = [u8; 8];
 
 /// The rest of a transfer.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 enum Progress {
-    Upload { sent: usize },
-    Download { received: ArrayVec<u8, WRITABLE_BYTES>, announced: Option<u32> },
+    Upload { data: Vec<u8>, sent: usize },
+    Download { received: Vec<u8>, room: usize, announced: Option<u32> },
+    BlockUpload(BlockUpload),
+    BlockDownload(BlockDownload),
 }
 
-/// A transfer in segments that has begun.
+/// A transfer that has begun.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct Transfer {
     object: ObjectAddress,
@@ -51,10 +47,15 @@ impl Transfer {
         }
         Ok(Self { toggle: !toggle, heard_ns: now_ns, ..self })
     }
+
+    /// Whether the next frame is a segment of a block.
+    fn takes_segments(&self) -> bool {
+        matches!(&self.progress, Progress::BlockDownload(download) if !download.is_whole())
+    }
 }
 
-/// The answer to a request, with the rest of the transfer.
-type Answer = Result<(SdoResponse, Option<Transfer>), AbortCode>;
+/// The answer to a request, if it has one, with the rest of the transfer.
+type Answer = Result<(Option<Response>, Option<Transfer>), AbortCode>;
 
 /// The server's memory.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
@@ -64,77 +65,104 @@ pub(super) struct SdoServer {
 
 impl SdoServer {
     /// Takes a request; returns the answer, if there is one.
-    pub(super) fn answer(&mut self, data: &[u8], access: &mut DictionaryAccess<'_>) -> Option<SdoResponse> {
+    pub(super) fn answer(&mut self, data: &[u8], access: &mut DictionaryAccess<'_>) -> Option<Response> {
         let request = match SdoRequest::decode(data) {
-            Ok(request) => request,
-            Err(SdoError::UnknownCommand { object, .. }) => {
-                self.transfer = None;
-                return Some(SdoResponse::Abort { object, code: AbortCode::UNKNOWN_COMMAND });
-            }
             Err(SdoError::Length(_)) => return None,
+            request => request,
         };
-        let now_ns = access.now_ns;
         let transfer = self.transfer.take();
         let running = transfer.as_ref().map_or(ObjectAddress::new(0, 0), |transfer| transfer.object);
-        let continued = |toggle| transfer.ok_or(AbortCode::UNKNOWN_COMMAND)?.continued(now_ns, toggle);
-        let (object, answer) = match request {
-            SdoRequest::Abort { .. } => return None,
-            SdoRequest::InitiateUpload { object } => (object, begin_upload(object, access)),
-            SdoRequest::UploadSegment { toggle } => {
-                (running, continued(toggle).and_then(|transfer| upload(transfer, toggle, access)))
-            }
-            SdoRequest::Download { object, data } => {
-                let written = access.write(object, data.data(), data.is_sized());
-                (object, written.map(|()| (SdoResponse::Download { object }, None)))
-            }
-            SdoRequest::InitiateDownload { object, size } => (object, begin_download(object, size, access)),
-            SdoRequest::DownloadSegment { toggle, data, is_last } => {
-                let answer = continued(toggle).and_then(|transfer| download(transfer, data, is_last, access));
-                (running, answer.map(|transfer| (SdoResponse::DownloadSegment { toggle }, transfer)))
-            }
+        // In a block every frame but an abort is a segment.
+        let segment = transfer.as_ref().filter(|transfer| transfer.takes_segments());
+        let (object, answer) = match (segment.and_then(|_| BlockSegment::decode(data)), request) {
+            (Some(segment), _) => (running, take_segment(transfer, segment, access.now_ns)),
+            (None, Ok(SdoRequest::Abort { .. })) => return None,
+            (None, Ok(request)) => take_request(transfer, request, running, access),
+            (None, Err(SdoError::UnknownCommand { object, .. })) => match BlockMessage::decode(data) {
+                Some(message) => take_block_message(transfer, message, running, access),
+                None => (object, Err(AbortCode::UNKNOWN_COMMAND)),
+            },
+            (None, Err(SdoError::Length(_))) => return None,
         };
-        let (response, transfer) = answer.unwrap_or_else(|code| (SdoResponse::Abort { object, code }, None));
+        let abort = |code| (Some(SdoResponse::Abort { object, code }.encode()), None);
+        let (response, transfer) = answer.unwrap_or_else(abort);
         self.transfer = transfer;
-        Some(response)
+        response
     }
 
-    /// Aborts a transfer after the silence of its client; returns the abort message.
-    pub(super) fn expire(&mut self, now_ns: u64) -> Option<SdoResponse> {
-        let is_late = |transfer: &mut Transfer| now_ns.saturating_sub(transfer.heard_ns) > TIMEOUT_NS;
-        let transfer = self.transfer.take_if(is_late)?;
-        Some(SdoResponse::Abort { object: transfer.object, code: AbortCode::TIMED_OUT })
+    /// The server's next frame without a request: an abort after the silence of the client, or a segment of a block.
+    /// One segment a step is about as fast as the bus.
+    pub(super) fn step(&mut self, now_ns: u64) -> Option<Response> {
+        let transfer = self.transfer.as_mut()?;
+        if now_ns.saturating_sub(transfer.heard_ns) > TIMEOUT_NS {
+            let object = transfer.object;
+            self.transfer = None;
+            return Some(SdoResponse::Abort { object, code: AbortCode::TIMED_OUT }.encode());
+        }
+        let Progress::BlockUpload(upload) = &mut transfer.progress else { return None };
+        let segment = upload.next_segment()?;
+        transfer.heard_ns = now_ns;
+        Some(segment.encode())
+    }
+}
+
+/// Takes a request of an expedited transfer or one in segments; returns its object and the answer.
+fn take_request(
+    transfer: Option<Transfer>,
+    request: SdoRequest,
+    running: ObjectAddress,
+    access: &mut DictionaryAccess<'_>,
+) -> (ObjectAddress, Answer) {
+    let now_ns = access.now_ns;
+    let continued = |toggle| transfer.ok_or(AbortCode::UNKNOWN_COMMAND)?.continued(now_ns, toggle);
+    match request {
+        SdoRequest::InitiateUpload { object } => (object, begin_upload(object, access)),
+        SdoRequest::UploadSegment { toggle } => {
+            (running, continued(toggle).and_then(|transfer| upload(transfer, toggle)))
+        }
+        SdoRequest::Download { object, data } => {
+            let written = access.write(object, data.data(), data.is_sized());
+            (object, written.map(|()| (Some(SdoResponse::Download { object }.encode()), None)))
+        }
+        SdoRequest::InitiateDownload { object, size } => (object, begin_download(object, size, access)),
+        SdoRequest::DownloadSegment { toggle, data, is_last } => {
+            let answer = continued(toggle).and_then(|transfer| download(transfer, data, is_last, access));
+            let response = SdoResponse::DownloadSegment { toggle };
+            (running, answer.map(|transfer| (Some(response.encode()), transfer)))
+        }
+        SdoRequest::Abort { .. } => (running, Ok((None, None))),
     }
 }
 
 fn begin_upload(object: ObjectAddress, access: &mut DictionaryAccess<'_>) -> Answer {
-    Ok(match access.read(object)? {
+    let (response, transfer) = match access.read(object)? {
         Value::Number(data) => (SdoResponse::Upload { object, data }, None),
-        Value::Text(text) => {
-            let response = SdoResponse::InitiateUpload { object, size: Some(text.len() as u32) };
-            (response, Some(Transfer::begin(access.now_ns, object, Progress::Upload { sent: 0 })))
+        Value::Bytes(data) => {
+            let response = SdoResponse::InitiateUpload { object, size: Some(data.len() as u32) };
+            (response, Some(Transfer::begin(access.now_ns, object, Progress::Upload { data, sent: 0 })))
         }
-    })
+    };
+    Ok((Some(response.encode()), transfer))
 }
 
-fn upload(mut transfer: Transfer, toggle: bool, access: &mut DictionaryAccess<'_>) -> Answer {
-    let Progress::Upload { sent } = &mut transfer.progress else { return Err(AbortCode::UNKNOWN_COMMAND) };
-    let Value::Text(text) = access.read(transfer.object)? else { return Err(AbortCode::UNKNOWN_COMMAND) };
-    let rest = &text.as_bytes()[*sent..];
+fn upload(mut transfer: Transfer, toggle: bool) -> Answer {
+    let Progress::Upload { data, sent } = &mut transfer.progress else {
+        return Err(AbortCode::UNKNOWN_COMMAND);
+    };
+    let rest = &data[*sent..];
     let now = &rest[..rest.len().min(Segment::MAX)];
     *sent += now.len();
     let is_last = now.len() == rest.len();
     let data = Segment::new(now).expect("no more than a segment holds");
-    Ok((SdoResponse::UploadSegment { toggle, data, is_last }, (!is_last).then_some(transfer)))
+    let response = SdoResponse::UploadSegment { toggle, data, is_last };
+    Ok((Some(response.encode()), (!is_last).then_some(transfer)))
 }
 
 fn begin_download(object: ObjectAddress, size: Option<u32>, access: &DictionaryAccess<'_>) -> Answer {
-    access.overlay.find(object)?.1.check_access()?;
-    if size.is_some_and(|size| size > WRITABLE_BYTES as u32) {
-        return Err(AbortCode::TOO_LONG);
-    }
-    let progress = Progress::Download { received: ArrayVec::new(), announced: size };
+    let room = access.room(object, size)?;
+    let progress = Progress::Download { received: Vec::new(), room, announced: size };
     let transfer = Transfer::begin(access.now_ns, object, progress);
-    Ok((SdoResponse::Download { object }, Some(transfer)))
+    Ok((Some(SdoResponse::Download { object }.encode()), Some(transfer)))
 }
 
 /// Takes a segment and writes the entry with the last one; returns the transfer that goes on.
@@ -144,10 +172,13 @@ fn download(
     is_last: bool,
     access: &mut DictionaryAccess<'_>,
 ) -> Result<Option<Transfer>, AbortCode> {
-    let Progress::Download { received, announced } = &mut transfer.progress else {
+    let Progress::Download { received, room, announced } = &mut transfer.progress else {
         return Err(AbortCode::UNKNOWN_COMMAND);
     };
-    received.try_extend_from_slice(data.data()).map_err(|_| AbortCode::TOO_LONG)?;
+    received.extend_from_slice(data.data());
+    if received.len() > *room {
+        return Err(AbortCode::TOO_LONG);
+    }
     if !is_last {
         return Ok(Some(transfer));
     }
@@ -158,261 +189,79 @@ fn download(
     Ok(None)
 }
 
-/// A value that was read.
-pub(super) enum Value {
-    Number(Expedited),
-    Text(&'static str),
-}
-
-/// A client's access at an instant.
-pub(super) struct DictionaryAccess<'a> {
-    pub(super) now_ns: u64,
-    pub(super) objects: &'a mut Objects,
-    pub(super) storage: &'a mut Storage,
-    pub(super) axis: &'a Axis,
-    pub(super) overlay: &'a Overlay,
-    pub(super) is_operational: bool,
-    /// Whether PDO parameters cannot be written now.
-    pub(super) locks_pdos: bool,
-    /// The object written, whose effect is due.
-    pub(super) written: Option<ObjectAddress>,
-}
-
-impl DictionaryAccess<'_> {
-    /// The value of an entry.
-    pub(super) fn read(&mut self, object: ObjectAddress) -> Result<Value, AbortCode> {
-        let (place, entry) = self.overlay.find(object)?;
-        if let Initial::Text(text) = entry.initial {
-            return Ok(Value::Text(text));
+/// Takes a message of a block transfer; returns its object and the answer.
+fn take_block_message(
+    transfer: Option<Transfer>,
+    message: BlockMessage,
+    running: ObjectAddress,
+    access: &mut DictionaryAccess<'_>,
+) -> (ObjectAddress, Answer) {
+    match message {
+        BlockMessage::Receive { object, has_crc, block_size, .. } => {
+            (object, begin_block_upload(object, has_crc, block_size, access))
         }
-        if object.index == 0x1003 && object.subindex > self.objects.get(names::ERROR_COUNT) {
-            return Err(AbortCode::NO_DATA);
+        BlockMessage::Send { object, has_crc, size } => {
+            (object, begin_block_download(object, has_crc, size, access))
         }
-        self.axis.show(self.now_ns, self.objects);
-        let word = self.overlay.shown(place).unwrap_or(self.objects.words[place]).to_le_bytes();
-        let data = Expedited::new(&word[..entry.kind.bytes()]).ok_or(AbortCode::GENERAL)?;
-        Ok(Value::Number(data))
-    }
-
-    /// Writes an entry; where `is_sized` is false, `data` may be longer than the value.
-    pub(super) fn write(
-        &mut self,
-        object: ObjectAddress,
-        data: &[u8],
-        is_sized: bool,
-    ) -> Result<(), AbortCode> {
-        let (place, entry) = self.overlay.find(object)?;
-        if self.overlay.shown(place).is_some() {
-            return entry.check_access();
-        }
-        let word = entry.writable(data, is_sized)?;
-        let is_closed = match object.index {
-            0x1400..0x1C00 => self.locks_pdos,
-            0x1010 | 0x1011 => self.storage.saved_at_ns.is_some(),
-            _ => false,
-        };
-        if is_closed {
-            return Err(AbortCode::DEVICE_STATE);
-        }
-        self.check_value(object, word)?;
-        match object.index {
-            0x1010 => self.storage.save(self.now_ns, self.objects),
-            0x1011 => self.storage.restore_factory(),
-            _ => {
-                self.objects.words[place] = word;
-                self.written = Some(object);
-            }
-        }
-        Ok(())
-    }
-    /// Whether that word may be written to an entry now.
-    ///
-    /// # Errors
-    /// The abort code with the reason.
-    fn check_value(&self, object: ObjectAddress, word: u32) -> Result<(), AbortCode> {
-        let (ObjectAddress { index, subindex }, objects, axis) = (object, &*self.objects, self.axis);
-        match index {
-            0x1003 => allow(word == 0, AbortCode::INVALID_VALUE),
-            0x1010 => {
-                allow(word == SAVE, AbortCode::NOT_STORED)?;
-                allow(!axis.power.is_enabled(), AbortCode::DEVICE_STATE)
-            }
-            0x1011 => allow(word == LOAD, AbortCode::NOT_STORED),
-            0x1014 => cob_id(CobId(objects.get(names::EMERGENCY_COB_ID)), CobId(word)),
-            0x1016 => {
-                allow(!is_consumed_elsewhere(subindex, word, objects), AbortCode::PARAMETER_INCOMPATIBLE)
-            }
-            0x1019 => {
-                allow(word != 1, AbortCode::INVALID_VALUE)?;
-                allow(!self.is_operational, AbortCode::DEVICE_STATE)
-            }
-            0x1400..0x1600 | 0x1800..0x1A00 => communication(object, word, objects),
-            0x1600..0x1800 | 0x1A00..0x1C00 => mapping(object, word, objects, self.overlay),
-            0x605A => allow(!matches!(word, 3 | 4), AbortCode::INVALID_VALUE),
-            // 0 leaves the mode as it is.
-            0x6060 => allow(
-                word as i8 == 0 || Mode::supported(word as i8, objects).is_some(),
-                AbortCode::INVALID_VALUE,
-            ),
-            0x607D => {
-                let (lowest, highest) = match subindex {
-                    1 => (word as i32, objects.get(names::MAX_POSITION_LIMIT)),
-                    _ => (objects.get(names::MIN_POSITION_LIMIT), word as i32),
-                };
-                allow(lowest <= highest, AbortCode::MAXIMUM_BELOW_MINIMUM)
-            }
-            0x6098 => {
-                allow(Homing::is_method(word as i8), AbortCode::INVALID_VALUE)?;
-                allow(!axis.homing.is_running(), AbortCode::DEVICE_STATE)
-            }
-            0x60C2 => allow(!axis.power.is_enabled(), AbortCode::DEVICE_STATE),
-            _ => Ok(()),
-        }
+        message => (running, continue_block(transfer, message, access)),
     }
 }
 
-/// Signature of 1010h, "save".
-const SAVE: u32 = u32::from_le_bytes(*b"save");
-/// Signature of 1011h, "load".
-const LOAD: u32 = u32::from_le_bytes(*b"load");
-/// Bits that a PDO carries at most.
-const PDO_BITS: usize = 64;
-
-/// An error unless the condition holds.
-fn allow(is_allowed: bool, code: AbortCode) -> Result<(), AbortCode> {
-    if is_allowed { Ok(()) } else { Err(code) }
-}
-
-/// Whether another entry of 1016h consumes the same node's heartbeat.
-fn is_consumed_elsewhere(subindex: u8, word: u32, objects: &Objects) -> bool {
-    let Some(node) = consumed_node(word) else { return false };
-    let mut others = (1..=CONSUMED as u8).filter(|&other| other != subindex);
-    others.any(|other| consumed_node(objects.at(0x1016, other)) == Some(node))
-}
-
-/// A new COB-ID in place of an old one: an identifier may change only while its object does not exist.
-fn cob_id(before: CobId, after: CobId) -> Result<(), AbortCode> {
-    let takes_restricted = after.is_valid() && is_restricted(after.number());
-    let is_changed = before.is_valid() && after.is_valid() && after.number() != before.number();
-    allow(after.is_standard() && !takes_restricted && !is_changed, AbortCode::INVALID_VALUE)
-}
-
-/// Identifiers that no configurable object may use (CiA 301, table 40).
-const fn is_restricted(identifier: u32) -> bool {
-    matches!(
-        identifier,
-        0x000..=0x080 | 0x101..=0x180 | 0x581..=0x5FF | 0x601..=0x67F | 0x6E0..=0x6FF | 0x701..
-    )
-}
-
-/// The COB-ID of the PDO that a communication or mapping parameter belongs to.
-fn pdo_cob_id(index: u16, objects: &Objects) -> CobId {
-    // 1600h + n belongs to 1400h + n, 1A00h + n to 1800h + n.
-    let communication = index & !0x0200 & 0xFC00 | index & 0x00FF;
-    CobId(objects.at(communication, 1))
-}
-
-fn communication(object: ObjectAddress, word: u32, objects: &Objects) -> Result<(), AbortCode> {
-    let before = pdo_cob_id(object.index, objects);
-    let is_allowed = match object.subindex {
-        1 => {
-            cob_id(before, CobId(word))?;
-            let carries_nothing = objects.at(object.index + 0x0200, 0) == 0;
-            !(CobId(word).is_valid() && carries_nothing)
-        }
-        // 241 to 251 are reserved, 252 and 253 answer remote requests.
-        2 => !matches!(word, 241..=253),
-        3 | 6 => !before.is_valid(),
-        _ => true,
+fn begin_block_upload(
+    object: ObjectAddress,
+    has_crc: bool,
+    block_size: u8,
+    access: &mut DictionaryAccess<'_>,
+) -> Answer {
+    let data = match access.read(object)? {
+        Value::Number(data) => data.data().to_vec(),
+        Value::Bytes(data) => data,
     };
-    allow(is_allowed, AbortCode::INVALID_VALUE)
+    let response = BlockMessage::Send { object, has_crc: true, size: Some(data.len() as u32) };
+    let progress = Progress::BlockUpload(BlockUpload::new(data, has_crc, block_size)?);
+    Ok((Some(response.encode()), Some(Transfer::begin(access.now_ns, object, progress))))
 }
 
-/// The mapping changes only while the PDO does not exist, its entries only while it holds none.
-fn mapping(object: ObjectAddress, word: u32, objects: &Objects, overlay: &Overlay) -> Result<(), AbortCode> {
-    let ObjectAddress { index, subindex } = object;
-    let exists = pdo_cob_id(index, objects).is_valid();
-    let is_open = !exists && (subindex == 0 || objects.at(index, 0) == 0);
-    allow(is_open, AbortCode::PARAMETER_INCOMPATIBLE)?;
-    if subindex > 0 {
-        let is_transmitted = index >= 0x1A00;
-        return if word == 0 { Ok(()) } else { mappable(MappingEntry(word), is_transmitted, overlay) };
-    }
-    let has_gap = objects.mapping(index, word).any(|entry| entry.0 == 0);
-    allow(!has_gap, AbortCode::PARAMETER_INCOMPATIBLE)?;
-    let bits: usize = objects.mapping(index, word).map(MappingEntry::bits).sum();
-    allow(bits <= PDO_BITS, AbortCode::PDO_LENGTH)
+fn begin_block_download(
+    object: ObjectAddress,
+    has_crc: bool,
+    size: Option<u32>,
+    access: &DictionaryAccess<'_>,
+) -> Answer {
+    let room = access.room(object, size)?;
+    let response =
+        BlockMessage::Receive { object, has_crc: true, block_size: BlockSegment::MAX, threshold: 0 };
+    let progress = Progress::BlockDownload(BlockDownload::new(has_crc, size, room));
+    Ok((Some(response.encode()), Some(Transfer::begin(access.now_ns, object, progress))))
 }
 
-/// Whether an object may be mapped with that length.
-fn mappable(entry: MappingEntry, is_transmitted: bool, overlay: &Overlay) -> Result<(), AbortCode> {
-    let (_, object) = overlay.find(entry.object())?;
-    let is_allowed = match object.mapping {
-        Mapping::Never => false,
-        Mapping::Tpdo => is_transmitted,
-        Mapping::Any => true,
+fn take_segment(transfer: Option<Transfer>, segment: BlockSegment, now_ns: u64) -> Answer {
+    let mut transfer = transfer.ok_or(AbortCode::UNKNOWN_COMMAND)?;
+    let Progress::BlockDownload(download) = &mut transfer.progress else {
+        return Err(AbortCode::UNKNOWN_COMMAND);
     };
-    let has_length = object.kind != DataType::Text && object.kind.bytes() * 8 == entry.bits();
-    allow(is_allowed && has_length, AbortCode::NOT_MAPPABLE)
+    let response = download.take(segment)?;
+    transfer.heard_ns = now_ns;
+    Ok((response.map(BlockMessage::encode), Some(transfer)))
 }
 
-const _: () = assert!(MAPPED_MAX * 8 == PDO_BITS, "eight bytes hold eight objects at most");
-
-/// Objects that command something at once; they are no parameters.
-const COMMANDS: [u16; 9] = [0x1003, 0x1010, 0x1011, 0x6040, 0x6071, 0x607A, 0x60B0, 0x60B1, 0x60B2];
-/// 1010h:01 while the drive saves, and when it can be asked to (CiA 301).
-const BUSY: u32 = 0;
-const SAVES_ON_COMMAND: u32 = 1;
-
-/// Dictionaries that survive a reset.
-#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
-pub(super) struct Storage {
-    /// The values that a reset restores.
-    pub(super) stored: Objects,
-    /// The values of delivery.
-    pub(super) factory: Objects,
-    /// How long saving takes, ns.
-    save_ns: u64,
-    /// When the present saving ends, ns.
-    pub(super) saved_at_ns: Option<u64>,
-    /// Whether stored values have changed since somebody asked.
-    pub(super) has_changed: bool,
-}
-
-impl Storage {
-    /// The values of delivery, and those stored by a drive that was switched off since.
-    pub(super) fn new(factory: &Objects, stored: &Objects, save_ns: u64) -> Self {
-        let (factory, stored) = (factory.clone(), stored.clone());
-        Self { stored, factory, save_ns, saved_at_ns: None, has_changed: false }
-    }
-
-    /// Stores the values of delivery (1011h).
-    pub(super) fn restore_factory(&mut self) {
-        self.stored = self.factory.clone();
-        self.has_changed = true;
-    }
-
-    /// Begins to store all parameters (1010h).
-    pub(super) fn save(&mut self, now_ns: u64, objects: &mut Objects) {
-        self.saved_at_ns = Some(now_ns + self.save_ns);
-        objects.set(names::SAVE_ALL, BUSY);
-        self.end_saving(now_ns, objects);
-    }
-
-    /// Ends the saving when it is time.
-    pub(super) fn end_saving(&mut self, now_ns: u64, objects: &mut Objects) {
-        if self.saved_at_ns.take_if(|saved_at_ns| now_ns >= *saved_at_ns).is_some() {
-            objects.set(names::SAVE_ALL, SAVES_ON_COMMAND);
-            self.store(objects);
+fn continue_block(
+    transfer: Option<Transfer>,
+    message: BlockMessage,
+    access: &mut DictionaryAccess<'_>,
+) -> Answer {
+    let mut transfer = transfer.ok_or(AbortCode::UNKNOWN_COMMAND)?;
+    transfer.heard_ns = access.now_ns;
+    match (&mut transfer.progress, message) {
+        (Progress::BlockUpload(upload), BlockMessage::EndReceiving) if upload.is_ending() => Ok((None, None)),
+        (Progress::BlockUpload(upload), message) => {
+            let response = upload.take(message)?;
+            Ok((response.map(BlockMessage::encode), Some(transfer)))
         }
-    }
-
-    fn store(&mut self, objects: &Objects) {
-        for (place, entry) in ENTRIES.iter().enumerate() {
-            if entry.access == Access::ReadWrite && !COMMANDS.contains(&entry.address.index) {
-                self.stored.words[place] = objects.words[place];
-            }
+        (Progress::BlockDownload(download), BlockMessage::EndSending { unused, crc }) => {
+            access.write(transfer.object, download.end(unused, crc)?, true)?;
+            Ok((Some(BlockMessage::EndReceiving.encode()), None))
         }
-        self.has_changed = true;
+        _ => Err(AbortCode::UNKNOWN_COMMAND),
     }
 }

@@ -1,5 +1,6 @@
 //! Scenarios of a single drive that moves a mass, driven by frames alone.
 
+mod blocks;
 mod commissioning;
 mod communication;
 mod cyclic;

@@ -107,7 +107,8 @@ fn every_entry_can_be_read_and_has_the_length_of_its_type() {
         let object = entry.address;
         let answer = bench.ask(SdoRequest::InitiateUpload { object }).expect("an answer");
         match (entry.kind, answer) {
-            (DataType::Text, SdoResponse::InitiateUpload { size: Some(1..), .. }) => {}
+            (DataType::Text, SdoResponse::InitiateUpload { size: Some(1..), .. })
+            | (DataType::Domain, SdoResponse::InitiateUpload { size: Some(0), .. }) => {}
             (kind, SdoResponse::Upload { data, .. }) => {
                 assert_eq!(data.data().len(), kind.bytes(), "{object}");
             }
@@ -125,7 +126,7 @@ fn what_may_be_written_can_be_written_as_it_was_read() {
     for entry in ENTRIES.iter().filter(|entry| entry.access == Access::ReadWrite) {
         let object = (entry.address.index, entry.address.subindex);
         let is_live_pdo = matches!(object, (0x1600 | 0x1A00, _) | (0x1800, 3 | 6));
-        if by_signature_or_unmapped.contains(&object.0) || is_live_pdo {
+        if by_signature_or_unmapped.contains(&object.0) || is_live_pdo || entry.kind == DataType::Domain {
             continue;
         }
         let mut bench = Bench::new();

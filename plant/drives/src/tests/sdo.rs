@@ -5,6 +5,8 @@ use masseter_can::canopen::Segment;
 use super::*;
 
 const NUMBER: ObjectAddress = ObjectAddress::new(0x6081, 0);
+/// At most 1024 bytes.
+pub(super) const USER_DATA: ObjectAddress = ObjectAddress::new(0x2010, 0);
 const TEXT: ObjectAddress = ObjectAddress::new(0x1008, 0);
 
 impl Bench {
@@ -19,11 +21,11 @@ impl Bench {
         }
     }
 
-    /// The abort messages that the drive has sent.
-    fn aborts(&self) -> Vec<SdoResponse> {
+    /// The abort messages that the drive has sent. The code of other frames with the same command is a segment's.
+    pub(super) fn aborts(&self) -> Vec<SdoResponse> {
         let frames = self.sent.iter().filter(|frame| frame.id() == Cob::SdoResponse(id(4)).into());
-        let responses = frames.map(|frame| SdoResponse::decode(frame.data()).unwrap());
-        responses.filter(|response| matches!(response, SdoResponse::Abort { .. })).collect()
+        let aborts = frames.filter(|frame| frame.data()[0] == 0x80);
+        aborts.map(|frame| SdoResponse::decode(frame.data()).unwrap()).collect()
     }
 }
 
@@ -100,14 +102,29 @@ fn an_abort_names_the_object_of_its_transfer() {
 }
 
 #[test]
-fn block_transfer_is_unknown_and_a_short_frame_is_ignored() {
+fn an_unknown_command_is_aborted_and_a_short_frame_is_ignored() {
     let mut bench = Bench::new();
-    bench.receive(pdo(0x604, &[0xA0, 0x08, 0x10, 0, 0, 0, 0, 0]));
+    bench.receive(pdo(0x604, &[0xE0, 0x08, 0x10, 0, 0, 0, 0, 0]));
     let unknown = SdoResponse::Abort { object: TEXT, code: AbortCode::UNKNOWN_COMMAND };
     assert_eq!(bench.aborts(), [unknown]);
     let sent = bench.sent.len();
     bench.receive(pdo(0x604, &[0x40, 0x08, 0x10]));
+    bench.receive(pdo(0x604, &[0xA0, 0x08, 0x10]));
     assert_eq!(bench.sent.len(), sent);
+}
+
+#[test]
+fn user_data_are_written_and_read_in_segments() {
+    let mut bench = Bench::new();
+    bench.answer(SdoRequest::InitiateDownload { object: USER_DATA, size: None });
+    bench.answer(piece(false, b"seven b", false));
+    bench.answer(piece(true, b"ytes", true));
+    let begun = bench.answer(SdoRequest::InitiateUpload { object: USER_DATA });
+    assert_eq!(begun, SdoResponse::InitiateUpload { object: USER_DATA, size: Some(11) });
+    bench.nmt(NmtCommand::ResetNode);
+    bench.run_ms(25);
+    let emptied = bench.answer(SdoRequest::InitiateUpload { object: USER_DATA });
+    assert_eq!(emptied, SdoResponse::InitiateUpload { object: USER_DATA, size: Some(0) });
 }
 
 #[test]

@@ -15,7 +15,9 @@ mod sdo;
 pub use messages::{
     Emergency, EmergencyCode, Heartbeat, HeartbeatError, Nmt, NmtCommand, NmtState, NmtTarget, sync,
 };
-pub use sdo::{AbortCode, Expedited, SdoError, SdoRequest, SdoResponse, Segment};
+pub use sdo::{
+    AbortCode, BlockMessage, BlockSegment, Expedited, SdoError, SdoRequest, SdoResponse, Segment, block_crc,
+};
 
 /// A number that is no node id.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]

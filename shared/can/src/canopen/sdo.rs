@@ -2,16 +2,19 @@
 //! transfer is expedited (at most 4 bytes) or in segments of 7.
 //!
 //! A client sends an [`SdoRequest`], a server answers with an [`SdoResponse`]; both have eight bytes. This module only
-//! encodes and decodes: client and server keep the order of a transfer, its toggle bits and its time-outs. Block
-//! transfer and network indication are not represented.
+//! encodes and decodes: client and server keep the order of a transfer, its toggle bits and its time-outs. Network
+//! indication is not represented. The messages of block transfer are a type of their own, [`BlockMessage`].
 
 use std::fmt;
 
 use super::{Cob, LengthError, NodeId, ObjectAddress, exactly};
 use crate::frame::Frame;
 
+mod block;
 #[cfg(test)]
 mod tests;
+
+pub use block::{BlockMessage, BlockSegment, block_crc};
 
 /// Bytes of every SDO message.
 const LENGTH: usize = 8;
@@ -187,9 +190,7 @@ pub enum SdoError {
     Length(#[from] LengthError),
     /// An unsupported command specifier; a server aborts with
     /// [`AbortCode::UNKNOWN_COMMAND`].
-    #[error(
-        "command {command:02X}h for {object} is not a supported SDO service (block transfer is not supported)"
-    )]
+    #[error("command {command:02X}h for {object} is no expedited or segmented SDO service")]
     UnknownCommand {
         /// The first byte.
         command: u8,
@@ -362,6 +363,9 @@ abort_codes! {
     TOGGLE = 0x0503_0000, "toggle bit did not alternate";
     TIMED_OUT = 0x0504_0000, "SDO protocol timed out";
     UNKNOWN_COMMAND = 0x0504_0001, "command specifier is not valid or unknown";
+    BLOCK_SIZE = 0x0504_0002, "block size is not valid";
+    SEQUENCE = 0x0504_0003, "sequence number is not valid";
+    CRC = 0x0504_0004, "CRC does not match the data";
     OUT_OF_MEMORY = 0x0504_0005, "memory does not suffice";
     UNSUPPORTED_ACCESS = 0x0601_0000, "access to the object is not supported";
     WRITE_ONLY = 0x0601_0001, "object is write-only";

@@ -75,7 +75,7 @@ fn what_no_message_carries_is_refused() {
 }
 
 #[test]
-fn block_transfer_is_refused_with_its_object() {
+fn a_message_of_block_transfer_is_refused_with_its_object() {
     let data = [0xC6, 0x08, 0x10, 0, 0, 0, 0, 0];
     let error = SdoRequest::decode(&data).unwrap_err();
     assert_eq!(error, SdoError::UnknownCommand { command: 0xC6, object: NAME });
