@@ -232,6 +232,7 @@ impl Analysis {
         self.outage.apply_reading(reading, is_of_scenario);
         if self.stop.apply_reading(reading) {
             self.tracking.stop(reading.cycle);
+            self.outage.stop(reading.woke_ns);
             self.figures.stop_without_event_ns.get_or_insert(reading.sampled_ns);
         }
         self.first_sample_ns.get_or_insert(reading.sampled_ns);
@@ -249,6 +250,7 @@ impl Analysis {
         }
         self.figures.cycles = self.figures.cycles.max(state.seq);
         self.figures.final_state = Some(state.controller_state.into());
+        self.figures.has_begun |= state.controller_state >= ControllerState::Running.code();
         if state.controller_state == ControllerState::SafeStop.code() {
             self.figures.stop_without_event_ns.get_or_insert(state.due_ns);
         }

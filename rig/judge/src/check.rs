@@ -88,7 +88,9 @@ pub(crate) enum Subject {
     /// Which motion was played, and how it ended.
     Sequence,
     /// The faults that the scenario declares.
-    Faults,
+    Faults {
+        have_all_acted: bool,
+    },
     /// The stimuli that the scenario declares.
     Stimuli,
     /// A requirement of the scenario.
@@ -111,6 +113,11 @@ impl Check {
     /// Whether the scenario names it as one that must fail.
     pub(crate) fn must_fail(&self, expect: Option<&ExpectConfig>) -> bool {
         expect.is_some_and(|expect| expect.failed.iter().any(|name| *name == self.name))
+    }
+
+    /// Whether it could not show. A declared fault that never acted stays untested, also where another one fails the check.
+    pub(crate) fn is_untested(&self) -> bool {
+        self.result == CheckResult::Untested || self.subject == Subject::Faults { have_all_acted: false }
     }
 
     pub(crate) fn judged(name: &'static str, finding: String, passed: bool) -> Self {
@@ -247,13 +254,14 @@ pub(crate) fn faults(
     let acted = declared.len() - idle.len() - late.len() - behind.len();
     let struck =
         format!("{acted} of {} declared faults acted{after}{never}{}", declared.len(), behind.concat());
-    let result = match (beyond.is_empty(), acted == declared.len()) {
+    let have_all_acted = acted == declared.len();
+    let result = match (beyond.is_empty(), have_all_acted) {
         (true, true) => CheckResult::Passed,
         (true, false) => CheckResult::Untested,
         (false, _) => CheckResult::Failed,
     };
     let check = Check::new("faults", struck + &beyond.concat(), result);
-    (!declared.is_empty()).then_some(Check { subject: Subject::Faults, ..check })
+    (!declared.is_empty()).then_some(Check { subject: Subject::Faults { have_all_acted }, ..check })
 }
 
 #[cfg(test)]

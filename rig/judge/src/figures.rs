@@ -61,6 +61,9 @@ pub struct Figures {
     pub stopped_by: Option<StoppedBy>,
     /// For how long all drives were enabled, s.
     pub enabled_s: f64,
+    /// Whether the controller's motion began, by its states: then it is the end that may be overdue.
+    #[serde(skip)]
+    pub has_begun: bool,
     /// For how long of it the controller was in the state `running`, s.
     #[serde(skip)]
     pub running_s: f64,
@@ -74,7 +77,7 @@ pub struct Figures {
     /// The last cycle that both loops ran, ns of the run's clock: a process that died may have begun the next.
     #[serde(skip)]
     pub last_cycle_ns: u64,
-    /// Deadlines missed just before a safe stop; none without one.
+    /// Deadlines missed just before a stop by controller, master or drives; none without one.
     pub outage: Option<Outage>,
     /// Distance of the platform from its desired pose, while the motion played.
     pub tracking: TrackingFigures,

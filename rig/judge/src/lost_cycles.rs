@@ -86,7 +86,7 @@ const DISORDER_NS: u64 = 2_000_000_000;
 /// Share of the cycles before a stop whose loss may explain it.
 const EXPLAINS: f64 = 0.1;
 
-/// The deadlines that controller or plant, whichever missed more, missed just before a safe stop.
+/// The deadlines that controller or plant, whichever missed more, missed just before a stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub struct Outage {
     /// Deadlines missed.
@@ -114,7 +114,7 @@ impl OutageWatch {
     /// `is_of_scenario`: a fault of the scenario made the misses.
     pub(super) fn apply_state(&mut self, state: &State, is_of_scenario: bool) {
         if state.controller_state == ControllerState::SafeStop.code() {
-            self.stopped_ns.get_or_insert(state.woke_ns);
+            self.stop(state.woke_ns);
         }
         self.controller.count_missed(state.woke_ns, state.skipped_cycles, self.stopped_ns, is_of_scenario);
     }
@@ -123,7 +123,12 @@ impl OutageWatch {
         self.plant.count_missed(reading.woke_ns, reading.skipped_cycles, self.stopped_ns, is_of_scenario);
     }
 
-    /// None without a safe stop.
+    /// Master, drives or controller stop, whichever is first: the messages of both loops come in any order.
+    pub(super) fn stop(&mut self, time_ns: u64) {
+        self.stopped_ns = Some(self.stopped_ns.map_or(time_ns, |stopped_ns| stopped_ns.min(time_ns)));
+    }
+
+    /// None without a stop.
     pub(super) fn outage(&self, period_ns: u64) -> Option<Outage> {
         let stopped_ns = self.stopped_ns?;
         let before = |misses: &Misses| misses.before(stopped_ns, period_ns);

@@ -6,7 +6,7 @@ use masseter_scenario::ExpectedVerdict::{Died, Fail, Incomplete, Interrupted, Pa
 use masseter_scenario::Scenario;
 
 use crate::breach::Breach;
-use crate::check::{Check, CheckResult, Subject};
+use crate::check::{Check, Subject};
 use crate::checks::lag_cause;
 use crate::events::{Code, EventRecord};
 use crate::figures::Figures;
@@ -174,7 +174,7 @@ impl NextStep {
         let has_own_time = || lag_cause(&figures.motion, limits.motion_lag_ms).is_some();
         match (check.subject, check.name.as_ref()) {
             (Subject::Requirement | Subject::ExpectedEvent, _) => Self::Requirement,
-            (Subject::Faults, _) => Self::Undetected,
+            (Subject::Faults { .. }, _) => Self::Undetected,
             (Subject::Sequence, _) if manifest.ending == Ending::Overdue => Self::Overdue,
             (Subject::Sequence, _) => Self::Sequence,
             (_, "stated pose") => Self::StatedPose,
@@ -224,9 +224,9 @@ impl NextStep {
     }
 
     fn of_untested(checks: &[Check]) -> Self {
-        let untested = checks.iter().find(|check| check.result == CheckResult::Untested);
+        let untested = checks.iter().find(|check| check.is_untested());
         match untested.map(|check| check.subject) {
-            Some(Subject::Faults | Subject::Stimuli) => Self::NeverActed,
+            Some(Subject::Faults { .. } | Subject::Stimuli) => Self::NeverActed,
             Some(Subject::Requirement | Subject::ExpectedEvent) => Self::NotJudged,
             _ => Self::TooLittle,
         }

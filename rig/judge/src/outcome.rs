@@ -216,13 +216,28 @@ pub(crate) fn clock_jump(usage: &RunUsage, can: &CanConfig) -> Option<OutcomeRea
     })
 }
 
-/// The excuse for a safe stop, in words: the machine lost all missed cycles, and many of them just before the stop.
-pub(crate) fn excuse(ending: &Ending, timing: &Timing, outage: Option<Outage>) -> Option<String> {
-    let outage = outage.filter(|outage| *ending == Ending::SafeStop && outage.explains_the_stop())?;
-    let is_machines = timing.is_disturbed() && timing.missed == 0;
-    is_machines.then(|| {
-        format!("lost cycles may explain the safe stop: {} of {} just before it", outage.missed, outage.of)
-    })
+/// The excuse for a stop, in words: the machine lost all missed cycles, and many of them just before a safe stop, or so many that
+/// an overdue controller had less than its time.
+pub(crate) fn excuse(manifest: &Manifest, figures: &Figures, timing: &Timing) -> Option<String> {
+    if !timing.is_disturbed() || timing.missed > 0 {
+        return None;
+    }
+    let Scenario { controller, .. } = &manifest.scenario;
+    let outage = figures.outage.filter(|outage| outage.explains_the_stop());
+    match (&manifest.ending, figures.stopped_by) {
+        (Ending::SafeStop, _) | (Ending::Completed, Some(_)) | (Ending::Overdue, Some(StoppedBy::Master)) => {
+            let Outage { missed, of } = outage?;
+            Some(format!("lost cycles may explain the safe stop: {missed} of {of} just before it"))
+        }
+        (Ending::Overdue, _) => {
+            let (lost_s, beyond_s) =
+                (timing.lost as f64 * manifest.scenario.period_s(), controller.overdue_s);
+            (lost_s >= beyond_s).then(|| {
+                format!("lost cycles may explain the late controller: {lost_s:.1} s, controller.overdue_s {beyond_s} s")
+            })
+        }
+        _ => None,
+    }
 }
 
 /// A failure with the missing part of the motion, which the names of checks do not show.

@@ -81,13 +81,10 @@ impl Shortfall {
     /// By the deadline that the plant kept.
     fn overdue(manifest: &Manifest, figures: &Figures) -> Self {
         let deadline = Deadline::new(&manifest.scenario, &manifest.declared, manifest.motion_s);
-        let is_early = figures.final_state.is_some_and(|state| {
-            use ControllerState::{Easing, Enabling, WaitReadings};
-            [WaitReadings, Enabling, Easing].into_iter().any(|early| state == early)
-        });
-        match figures.disorder {
-            Some(Disorder::NeverBegan) if is_early => Self::NotBegun { limit_s: deadline.begin_s },
-            _ => Self::NotEnded { limit_s: deadline.end_s },
+        if figures.has_begun {
+            Self::NotEnded { limit_s: deadline.end_s }
+        } else {
+            Self::NotBegun { limit_s: deadline.begin_s }
         }
     }
 

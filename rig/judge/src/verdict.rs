@@ -66,11 +66,11 @@ impl Verdict {
         let expect = manifest.scenario.expect.as_ref().filter(|expect| expect.has_outcome());
         let is_beside = |check: &Check| expect.is_some_and(|expect| stands_beside(check, expect));
         let (beside, checks): (Vec<_>, Vec<_>) = all.iter().cloned().partition(is_beside);
-        let excuse = excuse(&manifest.ending, &timing, figures.outage);
+        let excuse = excuse(manifest, figures, &timing);
         let is_too_late = figures.path_breach.first.is_some()
             || checks
                 .iter()
-                .any(|check| check.subject == Subject::Faults && check.result == CheckResult::Failed);
+                .any(|check| matches!(check.subject, Subject::Faults { .. }) && check.result.is_failed());
         let declared = declared_cause(&manifest.scenario, figures);
         let (mut outcome, mut reason) =
             ending(&manifest.ending, figures.stopped_by, declared, &figures.events)
@@ -143,7 +143,7 @@ impl Verdict {
 
     /// Whether a fault or stimulus of the scenario did not act, so that the run tested nothing of what it is about.
     pub fn has_idle_entry(&self) -> bool {
-        self.checks.iter().any(|check| is_of_scenario(check) && check.result == CheckResult::Untested)
+        self.checks.iter().any(|check| is_of_scenario(check) && check.is_untested())
     }
 
     /// Whether checks alone decided it, so that their findings are the reason.
@@ -180,7 +180,7 @@ fn failed(checks: &[Check]) -> Option<OutcomeReason> {
 
 /// The untested checks with their remedies; without a cycle, all of them.
 fn untested(checks: &[Check], cycles: u64) -> Option<OutcomeReason> {
-    let idle = checks.iter().filter(|check| check.result == CheckResult::Untested);
+    let idle = checks.iter().filter(|check| check.is_untested());
     let findings: Vec<_> = idle.map(|check| format!("{}: {}", check.name, check.finding)).collect();
     let why = if cycles == 0 { "no cycle ran".to_owned() } else { findings.join("; ") };
     (!why.is_empty()).then_some((Outcome::Named(Untested), why))
@@ -210,7 +210,8 @@ fn against(
     if let Some(other) = other_failures(expect, [checks, beside]) {
         return other;
     }
-    // The rig's own checks still count where the run goes on in order to its end.
+    // A fault or stimulus that did not act shows nothing, whatever is expected. The rig's own checks still count where the run
+    // goes on in order to its end.
     let own = || {
         let is_in_order = matches!(ending, SafeStop | Interrupted);
         let short = || incomplete(figures).or_else(|| failed(checks));
@@ -218,7 +219,7 @@ fn against(
             |check: &&Check| is_of_scenario(check) || (is_in_order && check.subject == Subject::Sequence);
         let idle: Vec<_> = checks.iter().filter(counts).cloned().collect();
         let in_order = is_in_order.then(short).flatten();
-        in_order.or_else(|| if ending == Untested { None } else { untested(&idle, figures.cycles) })
+        in_order.or_else(|| untested(&idle, figures.cycles))
     };
     let lost = || {
         let names = named(beside, CheckResult::Excused)?;
@@ -267,7 +268,7 @@ fn wanted(expect: &ExpectConfig) -> String {
 
 /// Whether it is a check of what the scenario lets happen.
 fn is_of_scenario(check: &Check) -> bool {
-    matches!(check.subject, Subject::Faults | Subject::Stimuli)
+    matches!(check.subject, Subject::Faults { .. } | Subject::Stimuli)
 }
 
 /// The sentence of a step, with the command of this run's machine and the arguments that play the scenario as this run did.

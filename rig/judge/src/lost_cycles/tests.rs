@@ -105,6 +105,17 @@ mod outage {
     }
 
     #[test]
+    fn the_first_stop_counts_whichever_message_comes_first() {
+        let mut watch = OutageWatch::default();
+        watch.apply_reading(
+            &Reading { woke_ns: 980 * PERIOD_NS, skipped_cycles: 30, ..Reading::default() },
+            false,
+        );
+        [1200, 1000, 1100].into_iter().for_each(|at_ms| watch.stop(at_ms * PERIOD_NS));
+        assert_eq!(watch.outage(PERIOD_NS), Some(Outage { missed: 30, of: 100 }));
+    }
+
+    #[test]
     fn a_run_that_did_not_stop_has_no_outage() {
         let mut watch = OutageWatch::default();
         watch.apply_reading(&Reading { skipped_cycles: 50, ..Reading::default() }, false);

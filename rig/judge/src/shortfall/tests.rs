@@ -116,21 +116,24 @@ fn states_out_of_order_fail_and_a_stop_by_request_excuses_a_motion_that_never_be
 
 #[test]
 fn a_controller_that_waited_for_ever_did_not_begin_or_did_not_end() {
-    let overdue = |state, disorder| {
+    let overdue = |state, has_begun, disorder| {
         shortfall(|manifest, figures| {
             (manifest.ending, figures.disorder) = (Ending::Overdue, disorder);
-            figures.final_state = Some(Code::Known(state));
+            (figures.final_state, figures.has_begun) = (Some(Code::Known(state)), has_begun);
             // What the plant did at the deadline.
             figures.stopped_by = Some(StoppedBy::QuickStop);
         })
     };
     let never = Some(Disorder::NeverBegan);
-    for (state, disorder, finding) in [
-        (ControllerState::Enabling, never, "did not begin the motion within "),
-        (ControllerState::Running, None, "did not end within "),
-        (ControllerState::Finished, never, "did not end within "),
+    let back = Some(Disorder::Back { from: ControllerState::Easing, to: ControllerState::Enabling });
+    for (state, has_begun, disorder, finding) in [
+        (ControllerState::Enabling, false, never, "did not begin the motion within "),
+        (ControllerState::Enabling, false, back, "did not begin the motion within "),
+        (ControllerState::Easing, true, back, "did not end within "),
+        (ControllerState::Running, true, None, "did not end within "),
+        (ControllerState::Finished, true, never, "did not end within "),
     ] {
-        let found = overdue(state, disorder).unwrap();
+        let found = overdue(state, has_begun, disorder).unwrap();
         assert_eq!(found.result(), CheckResult::Failed);
         assert!(found.to_string().starts_with(&format!("the controller {finding}")), "{found}");
     }

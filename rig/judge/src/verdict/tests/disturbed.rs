@@ -297,3 +297,29 @@ fn late_commands_are_told_and_judged_by_the_tracking() {
     assert!(found(&always).1.starts_with("9999 commands used a cycle late: "), "{:?}", found(&always));
     assert_eq!(always.reason, "every check passed; 9999 commands used a cycle late");
 }
+
+#[test]
+fn lost_cycles_may_explain_a_stop_by_the_master_and_a_controller_without_its_time() {
+    let verdict = |ending, stopped_by, overdue_s| {
+        let mut run = Run::new();
+        run.disturb();
+        run.manifest.scenario.controller.overdue_s = overdue_s;
+        (run.manifest.ending, run.figures.stopped_by) = (ending, stopped_by);
+        (run.figures.outage, run.figures.has_begun) = (Some(Outage { missed: 99, of: 100 }), true);
+        Verdict::new(&run.manifest, &run.figures)
+    };
+    let (lost_s, master) = (3.0 * Scenario::default().period_s(), Some(StoppedBy::Master));
+    let stop = "lost cycles may explain the safe stop: 99 of 100 just before it; ";
+    let late = "lost cycles may explain the late controller: ";
+    let overdue = "failed: sequence; the controller did not end within ";
+    for (ending, stopped_by, overdue_s, exit, reason) in [
+        (Ending::Completed, master, 10.0, Exit::Invalid, stop),
+        (Ending::Overdue, master, 10.0, Exit::Invalid, stop),
+        (Ending::Overdue, Some(StoppedBy::QuickStop), 10.0, Exit::Failed, overdue),
+        (Ending::Overdue, Some(StoppedBy::QuickStop), lost_s, Exit::Invalid, late),
+    ] {
+        let found = verdict(ending.clone(), stopped_by, overdue_s);
+        assert_eq!(found.exit_code, exit, "{ending:?}, {stopped_by:?}: {}", found.reason);
+        assert!(found.reason.starts_with(reason), "{ending:?}, {stopped_by:?}: {}", found.reason);
+    }
+}

@@ -168,3 +168,31 @@ fn an_expected_failure_that_is_named_must_fail_and_no_other_may() {
         why("expected that opens fails and nothing else, but tracking failed, opens did not")
     );
 }
+
+#[test]
+fn a_fault_that_never_acted_is_untested_whatever_is_expected() {
+    use ExpectedVerdict::{Fail, Untested};
+    let idle = |verdict, failed: &[&str], change: Change| {
+        let mut run = Run::new();
+        run.declare_fault();
+        let failed = failed.iter().map(|name| (*name).to_owned()).collect();
+        run.manifest.scenario.expect =
+            Some(ExpectConfig { verdict: Some(verdict), failed, ..ExpectConfig::default() });
+        change(&mut run);
+        let verdict = Verdict::new(&run.manifest, &run.figures);
+        assert!(verdict.has_idle_entry());
+        (verdict.word, verdict.reason)
+    };
+    let never = "1 of 2 declared faults acted, number 1 never: raise its probability";
+    let with_another = |run: &mut Run| {
+        run.declare_fault();
+        let other = &mut run.figures.faults[1];
+        (other.number, other.struck_ns) = (2, Some(1));
+        other.deviation_mm = 9.0;
+    };
+    assert_eq!(idle(Untested, &[], |_| ()).0, "UNTESTED");
+    assert_eq!(idle(Untested, &[], |run| require(run, CheckResult::Untested, true)).0, "UNTESTED");
+    let (word, reason) = idle(Fail, &["faults"], with_another);
+    assert_eq!(word, "UNTESTED");
+    assert!(reason.starts_with(&format!("faults: {never}")), "{reason}");
+}
