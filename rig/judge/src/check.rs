@@ -201,66 +201,51 @@ pub(crate) fn faults(
     lasted_s: [Option<f64>; 2],
 ) -> Option<Check> {
     let ChecksConfig { tracking_max_mm, tracking_max_deg, .. } = *limits;
-    let is_late = |(fault, found): &(&FaultConfig, &FaultFigures)| {
-        let struck_ns = found.struck_ns.filter(|_| fault.after.as_deref() != Some("controller.safe_stop"));
-        struck_ns.zip(stopped_ns).is_some_and(|(struck_ns, stopped_ns)| struck_ns > stopped_ns)
-    };
-    let numbers = |is_so: &dyn Fn(&(&FaultConfig, &FaultFigures)) -> bool| {
-        let so = declared.iter().zip(found).filter(is_so);
-        so.map(|(_, found)| found.number.to_string()).collect::<Vec<_>>()
-    };
     let behind_end = |fault: &FaultConfig| {
         let at_s = fault.at_s.filter(|_| fault.after.is_none());
         let mut begins_s = [at_s, fault.from_s].into_iter().zip(lasted_s);
-        begins_s
-            .find_map(|(begins_s, lasted_s)| begins_s.zip(lasted_s))
-            .filter(|(begins_s, lasted_s)| begins_s > lasted_s)
+        let [begins_s, lasted_s] = begins_s.find_map(|(begins_s, lasted_s)| Some([begins_s?, lasted_s?]))?;
+        (begins_s > lasted_s).then(|| format!("{begins_s} s, after the run's end at {lasted_s:.3} s"))
     };
-    let is_idle = |found: &FaultFigures| found.struck_ns.is_none();
-    let idle = numbers(&|(fault, found)| is_idle(found) && behind_end(fault).is_none());
-    let late = numbers(&is_late);
-    let behind: Vec<_> = declared
-        .iter()
-        .zip(found)
-        .filter(|(_, found)| is_idle(found))
-        .filter_map(|(fault, found)| {
-            let (begins_s, lasted_s) = behind_end(fault)?;
-            Some(format!(
-                ", number {} at {begins_s} s, after the run's end at {lasted_s:.3} s: let the fault begin earlier, or play longer",
-                found.number
-            ))
-        })
-        .collect();
-    let beyond: Vec<_> = declared
-        .iter()
-        .zip(found)
-        .filter(|(_, found)| {
-            !is_within(found.deviation_mm, tracking_max_mm) || !is_within(found.deviation_deg, tracking_max_deg)
-        })
-        .map(|(fault, FaultFigures { number, deviation_mm, deviation_deg, detection, .. })| {
+    let (mut acted, mut late, mut never) = (0, Vec::new(), Vec::new());
+    let (mut behind, mut beyond) = (String::new(), String::new());
+    for (fault, found) in declared.iter().zip(found) {
+        let FaultFigures { number, struck_ns, deviation_mm, deviation_deg, detection } = found;
+        let waits = fault.after.as_deref() == Some("controller.safe_stop");
+        match (struck_ns, behind_end(fault)) {
+            (None, None) => never.push(number.to_string()),
+            (None, Some(when)) => {
+                behind +=
+                    &format!(", number {number} at {when}: let the fault begin earlier, or play longer");
+            }
+            (Some(_), _) if !waits && stopped_ns.is_some_and(|ns| *struck_ns > Some(ns)) => {
+                late.push(number.to_string());
+            }
+            (Some(_), _) => acted += 1,
+        }
+        if !is_within(*deviation_mm, tracking_max_mm) || !is_within(*deviation_deg, tracking_max_deg) {
             let until = if detection.is_some() { "before it was detected" } else { "undetected" };
-            format!(
+            beyond += &format!(
                 "; number {number}, {fault}, moved the jaw {deviation_mm:.3} mm and {deviation_deg:.3}° from its path {until}, \
                  limit {tracking_max_mm} mm and {tracking_max_deg}°"
-            )
-        })
-        .collect();
+            );
+        }
+    }
     let which = |numbers: &[String], what: &str| match numbers {
         [] => String::new(),
         numbers => format!(", number {} {what}", numbers.join(", ")),
     };
-    let never = which(&idle, "never: raise its probability, or let the fault act earlier or longer");
+    let never = which(&never, "never: raise its probability, or let the fault act earlier or longer");
     let after = which(&late, "only after the rig had stopped");
-    let acted = declared.len() - idle.len() - late.len() - behind.len();
-    let struck =
-        format!("{acted} of {} declared faults acted{after}{never}{}", declared.len(), behind.concat());
     let have_all_acted = acted == declared.len();
     let result = match (beyond.is_empty(), have_all_acted) {
         (true, true) => CheckResult::Passed,
         (true, false) => CheckResult::Untested,
         (false, _) => CheckResult::Failed,
     };
-    let check = Check::new("faults", struck + &beyond.concat(), result);
+    let finding =
+        format!("{acted} of {} declared faults acted{after}{never}{behind}{beyond}", declared.len());
+    let check = Check::new("faults", finding, result);
     (!declared.is_empty()).then_some(Check { subject: Subject::Faults { have_all_acted }, ..check })
 }
 

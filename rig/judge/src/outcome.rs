@@ -222,20 +222,17 @@ pub(crate) fn excuse(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     if !timing.is_disturbed() || timing.missed > 0 {
         return None;
     }
-    let Scenario { controller, .. } = &manifest.scenario;
+    let lost_s = timing.lost as f64 * manifest.scenario.period_s();
+    let beyond_s = manifest.scenario.controller.overdue_s;
     let outage = figures.outage.filter(|outage| outage.explains_the_stop());
     match (&manifest.ending, figures.stopped_by) {
         (Ending::SafeStop, _) | (Ending::Completed, Some(_)) | (Ending::Overdue, Some(StoppedBy::Master)) => {
             let Outage { missed, of } = outage?;
             Some(format!("lost cycles may explain the safe stop: {missed} of {of} just before it"))
         }
-        (Ending::Overdue, _) => {
-            let (lost_s, beyond_s) =
-                (timing.lost as f64 * manifest.scenario.period_s(), controller.overdue_s);
-            (lost_s >= beyond_s).then(|| {
-                format!("lost cycles may explain the late controller: {lost_s:.1} s, controller.overdue_s {beyond_s} s")
-            })
-        }
+        (Ending::Overdue, _) if lost_s >= beyond_s => Some(format!(
+            "lost cycles may explain the late controller: {lost_s:.1} s, controller.overdue_s {beyond_s} s"
+        )),
         _ => None,
     }
 }

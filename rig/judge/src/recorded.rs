@@ -15,6 +15,7 @@ use masseter_scenario::{JawConfig, MotionConfig, Scenario};
 use serde::Serialize;
 
 use crate::poses::{turn, way};
+use crate::statistic::Sums;
 
 /// Incisal point, left and right condyle, then the jaw's orientation.
 const PLACES: [&str; 4] = ["incisal point", "left condyle", "right condyle", "orientation"];
@@ -79,11 +80,10 @@ pub struct RecordedWatch {
 
 #[derive(Debug, Clone)]
 struct Sum {
-    squares: f64,
+    lengths: Sums,
     /// Of the products with the whole error.
     with_whole: f64,
     values: Histogram<u64>,
-    largest: f64,
 }
 
 impl RecordedFigures {
@@ -117,10 +117,9 @@ impl RecordedWatch {
     /// For a motion on a jaw.
     pub fn new(trajectory: Trajectory, jaw: &JawConfig) -> Self {
         let empty = Sum {
-            squares: 0.0,
+            lengths: Sums::default(),
             with_whole: 0.0,
             values: Histogram::new(DIGITS).expect("two digits are allowed"),
-            largest: 0.0,
         };
         Self {
             trajectory: Arc::new(trajectory),
@@ -176,14 +175,14 @@ impl RecordedWatch {
     pub fn into_figures(self) -> Option<RecordedFigures> {
         let rows = (self.rows > 0).then_some(self.rows)?;
         let errors = self.sums.iter().enumerate().flat_map(|(place, sums)| {
-            let whole = sums[0].squares;
+            let whole = sums[0].lengths.squares;
             sums.iter().enumerate().map(move |(source, sum)| RecordedError {
                 place: PLACES[place],
                 source: SOURCES[source],
                 unit: if place < 3 { "mm" } else { "°" },
-                rms: (sum.squares / rows as f64).sqrt(),
+                rms: sum.lengths.rms(),
                 p95: sum.values.value_at_quantile(0.95) as f64 * COUNTED,
-                max: sum.largest,
+                max: sum.lengths.range.map_or(0.0, |[_, most]| most),
                 share: (source < 3 && whole > 0.0).then(|| sum.with_whole / whole),
             })
         });
@@ -203,11 +202,10 @@ impl RecordedWatch {
 impl Sum {
     fn add(&mut self, error: &Vec3, whole: &Vec3) {
         let length = error.norm();
-        self.squares += length * length;
+        self.lengths.add(length);
         self.with_whole += error.dot(whole);
         // With automatic growth, no value below the cap is refused.
         let _ = self.values.record((length.min(MOST) / COUNTED) as u64);
-        self.largest = self.largest.max(length);
     }
 }
 

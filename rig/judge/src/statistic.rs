@@ -1,4 +1,5 @@
-//! Figures of a sample of values: mean, spread, and how certain the mean is. No test of a hypothesis is here.
+//! Figures of a sample of values: mean, spread, how certain the mean is, and the sums of which checks and requirements take theirs.
+//! No test of a hypothesis is here.
 
 use serde::Serialize;
 
@@ -49,6 +50,40 @@ impl Statistic {
             mean_low: half.map(|half| mean - half),
             mean_high: half.map(|half| mean + half),
         }
+    }
+}
+
+/// Values that come one by one: the rig's own checks and the requirements of a scenario judge the same figures of them.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Sums {
+    pub(crate) samples: u64,
+    sum: f64,
+    pub(crate) squares: f64,
+    /// The smallest and the largest value.
+    pub(crate) range: Option<[f64; 2]>,
+}
+
+impl Sums {
+    pub(crate) fn add(&mut self, value: f64) {
+        self.samples += 1;
+        self.sum += value;
+        self.squares += value * value;
+        self.peak(value);
+    }
+
+    /// Takes a value that counts for the range alone.
+    pub(crate) fn peak(&mut self, value: f64) {
+        let [least, most] = self.range.unwrap_or([value; 2]);
+        self.range = Some([least.min(value), most.max(value)]);
+    }
+
+    /// NaN without values, as the root of the mean square.
+    pub(crate) fn mean(&self) -> f64 {
+        self.sum / self.samples as f64
+    }
+
+    pub(crate) fn rms(&self) -> f64 {
+        (self.squares / self.samples as f64).sqrt()
     }
 }
 

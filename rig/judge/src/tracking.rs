@@ -9,6 +9,7 @@ use serde::Serialize;
 use crate::measured::standard_error;
 use crate::poses::{desired_pose, deviation, estimated_pose, is_moving, is_running, true_pose, worse};
 use crate::signals::Sample;
+use crate::statistic::Sums;
 
 /// Where the actual pose comes from, which the desired pose is compared with.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -122,14 +123,14 @@ pub(super) struct Tracking {
     stopped: Option<u64>,
     errors: Errors,
     undisturbed: Errors,
-    estimates: Accumulator,
+    estimates: Sums,
     without_pose: u64,
     without_pose_ns: Option<u64>,
     track: Vec<TrackingSample>,
     next_sample_ns: u64,
     /// How often the time between two samples of the track has doubled.
     halvings: u32,
-    second: Accumulator,
+    second: Sums,
     second_ends_ns: u64,
     seconds: Vec<f64>,
 }
@@ -167,11 +168,12 @@ impl Tracking {
         };
         let error = deviation(desired.as_ref(), actual.as_ref(), self.incisal_m);
         let is_counted = on_path == OnPath::Moving && is_running(state);
+        let take = if is_counted { Sums::add } else { Sums::peak };
         if is_counted {
-            self.errors(is_disturbed).for_each(|errors| errors.actual.add(&error));
             self.add_to_second(error.origin_m, sampled_ns);
-        } else if on_path != OnPath::Off {
-            self.errors(is_disturbed).for_each(|errors| errors.actual.peak(&error));
+        }
+        if on_path != OnPath::Off {
+            self.errors(is_disturbed).for_each(|errors| errors.actual.each(&error, take));
         }
         if on_path == OnPath::Moving && is_used {
             let solution = messages
@@ -183,10 +185,10 @@ impl Tracking {
                 self.without_pose_ns.get_or_insert(sampled_ns);
             }
             let estimate = deviation(desired.as_ref(), estimated.as_ref(), self.incisal_m);
-            let add = if is_counted { PoseErrorSums::add } else { PoseErrorSums::peak };
-            self.errors(is_disturbed).for_each(|errors| add(&mut errors.estimated, &estimate));
+            self.errors(is_disturbed).for_each(|errors| errors.estimated.each(&estimate, take));
             if is_counted {
-                self.estimates.add(deviation(actual.as_ref(), estimated.as_ref(), self.incisal_m).origin_m);
+                let apart = deviation(actual.as_ref(), estimated.as_ref(), self.incisal_m);
+                self.estimates.add(worse(apart.origin_m, 0.0));
             }
         }
         if is_used && (is_moving || state == Some(ControllerState::SafeStop.code())) {
@@ -222,10 +224,10 @@ impl Tracking {
             if self.second.samples > 0 {
                 self.seconds.push(self.second.rms() * 1e3);
             }
-            self.second = Accumulator::default();
+            self.second = Sums::default();
             self.second_ends_ns = sampled_ns + SECOND_NS;
         }
-        self.second.add(distance_m);
+        self.second.add(worse(distance_m, 0.0));
     }
 
     pub(super) fn into_figures(self) -> (TrackingFigures, Vec<TrackingSample>) {
@@ -239,7 +241,7 @@ impl Tracking {
             actual,
             rms_noise_mm: standard_error(&self.seconds),
             estimated,
-            estimate_rms_mm: (samples > 0 && has_truth).then(|| self.estimates.rms() * 1e3),
+            estimate_rms_mm: (self.estimates.samples > 0 && has_truth).then(|| self.estimates.rms() * 1e3),
             undisturbed: self.undisturbed.figures(),
         };
         (figures, self.track)
@@ -267,33 +269,6 @@ pub struct PoseErrors {
     pub max_deg: Option<f64>,
 }
 
-/// Root mean square and maximum of the added values.
-#[derive(Debug, Clone, Default)]
-struct Accumulator {
-    samples: u64,
-    squares: f64,
-    largest: Option<f64>,
-}
-
-impl Accumulator {
-    /// Takes a value.
-    fn add(&mut self, value: f64) {
-        self.samples += 1;
-        self.squares += worse(value, 0.0).powi(2);
-        self.peak(value);
-    }
-
-    /// Takes a value that counts for the maximum alone.
-    fn peak(&mut self, value: f64) {
-        self.largest = Some(worse(self.largest.unwrap_or(0.0), value));
-    }
-
-    /// The root of the mean square; 0 without values.
-    fn rms(&self) -> f64 {
-        (self.squares / self.samples.max(1) as f64).sqrt()
-    }
-}
-
 /// Errors of the actual and of the estimated pose against the desired one.
 #[derive(Debug, Clone, Default)]
 struct Errors {
@@ -311,36 +286,30 @@ impl Errors {
 /// Collects [`PoseErrors`].
 #[derive(Debug, Clone, Default)]
 struct PoseErrorSums {
-    origin: Accumulator,
-    incisal: Accumulator,
-    angle: Accumulator,
+    origin: Sums,
+    incisal: Sums,
+    angle: Sums,
 }
 
 impl PoseErrorSums {
-    fn add(&mut self, deviation: &Deviation) {
-        self.each(deviation, Accumulator::add);
-    }
-
-    fn peak(&mut self, deviation: &Deviation) {
-        self.each(deviation, Accumulator::peak);
-    }
-
-    fn each(&mut self, deviation: &Deviation, take: fn(&mut Accumulator, f64)) {
-        take(&mut self.origin, deviation.origin_m * 1e3);
-        take(&mut self.incisal, deviation.incisal_m * 1e3);
-        take(&mut self.angle, deviation.angle_rad.to_degrees());
+    /// What is no number is infinitely far.
+    fn each(&mut self, deviation: &Deviation, take: fn(&mut Sums, f64)) {
+        take(&mut self.origin, worse(deviation.origin_m * 1e3, 0.0));
+        take(&mut self.incisal, worse(deviation.incisal_m * 1e3, 0.0));
+        take(&mut self.angle, worse(deviation.angle_rad.to_degrees(), 0.0));
     }
 
     fn figures(&self) -> PoseErrors {
-        let rms = |sum: &Accumulator| (sum.samples > 0).then(|| sum.rms());
+        let rms = |sums: &Sums| Some(sums.rms()).filter(|_| sums.samples > 0);
+        let max = |sums: &Sums| sums.range.map(|[_, most]| most);
         PoseErrors {
             samples: self.origin.samples,
             rms_mm: rms(&self.origin),
-            max_mm: self.origin.largest,
+            max_mm: max(&self.origin),
             incisal_rms_mm: rms(&self.incisal),
-            incisal_max_mm: self.incisal.largest,
+            incisal_max_mm: max(&self.incisal),
             rms_deg: rms(&self.angle),
-            max_deg: self.angle.largest,
+            max_deg: max(&self.angle),
         }
     }
 }

@@ -67,10 +67,7 @@ impl Verdict {
         let is_beside = |check: &Check| expect.is_some_and(|expect| stands_beside(check, expect));
         let (beside, checks): (Vec<_>, Vec<_>) = all.iter().cloned().partition(is_beside);
         let excuse = excuse(manifest, figures, &timing);
-        let is_too_late = figures.path_breach.first.is_some()
-            || checks
-                .iter()
-                .any(|check| matches!(check.subject, Subject::Faults { .. }) && check.result.is_failed());
+        let is_too_late = figures.path_breach.first.is_some();
         let declared = declared_cause(&manifest.scenario, figures);
         let (mut outcome, mut reason) =
             ending(&manifest.ending, figures.stopped_by, declared, &figures.events)

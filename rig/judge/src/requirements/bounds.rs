@@ -14,6 +14,7 @@ use super::trigger::Window;
 use crate::breach::{Breach, widen};
 use crate::series::{Extremes, Series};
 use crate::signals::Values;
+use crate::statistic::Sums;
 
 /// A signal or an expression.
 #[derive(Debug, Clone)]
@@ -112,7 +113,7 @@ pub(super) struct Bounds {
     statistic: Statistic,
     percentile: f64,
     limits: Limits,
-    samples: u64,
+    sums: Sums,
     missing: Missing,
     worst: Option<Worst>,
     /// The first value beyond a limit.
@@ -120,9 +121,6 @@ pub(super) struct Bounds {
     /// From the first to the last judged sample, ns.
     span_ns: Option<[u64; 2]>,
     fails_undisturbed: bool,
-    sum: f64,
-    squares: f64,
-    range: [f64; 2],
     /// Every value, for a percentile alone.
     values: Vec<f64>,
     series: Series<Extremes<1>>,
@@ -190,15 +188,12 @@ impl Bounds {
             statistic: config.statistic,
             percentile,
             limits,
-            samples: 0,
+            sums: Sums::default(),
             missing: Missing::default(),
             worst: None,
             first: None,
             span_ns: None,
             fails_undisturbed: false,
-            sum: 0.0,
-            squares: 0.0,
-            range: [f64::INFINITY, f64::NEG_INFINITY],
             values: Vec::new(),
             series: Series::default(),
             began_ns: None,
@@ -246,10 +241,7 @@ impl Bounds {
         // What the requirement does not judge would only spoil the scale of the plot.
         self.series.add(moment.time_ns - began_ns, 0, value / self.of.unit.si);
         let value = if self.statistic == Statistic::Abs { value.abs() } else { value };
-        self.samples += 1;
-        self.sum += value;
-        self.squares += value * value;
-        self.range = [self.range[0].min(value), self.range[1].max(value)];
+        self.sums.add(value);
         if self.statistic == Statistic::Percentile {
             self.values.push(value);
         }
@@ -272,13 +264,15 @@ impl Bounds {
         let is_signed = curve.iter().any(|(_, value)| *value < 0.0);
         let both_sides = |value: f64| if is_signed { vec![value, -value] } else { vec![value] };
         let limits = [self.limits.min, self.limits.max].into_iter().flatten().map(|limit| limit / si);
-        let value = if self.samples > 0 { self.value_of_statistic() / si } else { f64::NAN };
+        let value = if self.sums.samples > 0 { self.value_of_statistic() / si } else { f64::NAN };
         let (limits, found) = match self.statistic {
             Statistic::Value => (limits.collect(), None),
             Statistic::Abs => (limits.flat_map(both_sides).collect(), None),
             Statistic::Mean => (limits.collect(), Some(("mean", vec![value]))),
             Statistic::Rms => (limits.flat_map(both_sides).collect(), Some(("rms", both_sides(value)))),
-            Statistic::PeakToPeak => (Vec::new(), Some(("range", self.range.map(|end| end / si).to_vec()))),
+            Statistic::PeakToPeak => {
+                (Vec::new(), self.sums.range.map(|range| ("range", range.map(|end| end / si).to_vec())))
+            }
             Statistic::Percentile => (limits.collect(), Some(("percentile", vec![value]))),
         };
         RequirementPlot {
@@ -304,7 +298,7 @@ impl Bounds {
         let is_of_values = matches!(self.statistic, Statistic::Value | Statistic::Abs);
         let value = if is_of_values { worst.value } else { self.value_of_statistic() };
         let (margin, limit) = self.limits.margin(value);
-        let text = format!("{} in {} samples", unit.text(value), self.samples);
+        let text = format!("{} in {} samples", unit.text(value), self.sums.samples);
         let (first, span_ns) = match self.first.filter(|_| is_of_values) {
             Some(first) => (first.value, Some([first.time_ns; 2])),
             None => (value, self.span_ns),
@@ -323,16 +317,15 @@ impl Bounds {
     }
 
     fn value_of_statistic(&mut self) -> f64 {
-        let samples = self.samples as f64;
         match self.statistic {
             Statistic::Value | Statistic::Abs => f64::NAN,
-            Statistic::Mean => self.sum / samples,
-            Statistic::Rms => (self.squares / samples).sqrt(),
-            Statistic::PeakToPeak => self.range[1] - self.range[0],
+            Statistic::Mean => self.sums.mean(),
+            Statistic::Rms => self.sums.rms(),
+            Statistic::PeakToPeak => self.sums.range.map_or(f64::NAN, |[least, most]| most - least),
             Statistic::Percentile => {
                 self.values.sort_by(f64::total_cmp);
                 // The nearest rank; products of decimals are a little too large.
-                let rank = (self.percentile * samples / 100.0 - 1e-9).ceil() as usize;
+                let rank = (self.percentile * self.values.len() as f64 / 100.0 - 1e-9).ceil() as usize;
                 self.values[rank.saturating_sub(1).min(self.values.len() - 1)]
             }
         }

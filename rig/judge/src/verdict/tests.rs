@@ -10,8 +10,8 @@ use masseter_scenario::{BusFault, FaultConfig, Scenario};
 use super::*;
 use crate::{
     Analysis, Code, FaultFigures, LoopCounts, MotionFigures, Outage, Overrun, OverrunAttribution,
-    OverrunCause, PoseErrors, ResponseFigures, SkipFigures, StoppedBy, TopicFigures,
-    TrackingFigures, UndisturbedFigures,
+    OverrunCause, PoseErrors, ResponseFigures, SkipFigures, StoppedBy, TopicFigures, TrackingFigures,
+    UndisturbedFigures,
 };
 
 mod disturbed;
