@@ -50,6 +50,37 @@ fn friction_that_is_wrong_by_a_third_shifts_the_estimate_by_a_part_of_the_fricti
     assert!((0.5..4.0).contains(&rms_n), "{rms_n}");
 }
 
+/// Error, rms, and the share of the cycles that the stated uncertainty covers.
+fn error_and_coverage(robot: &str) -> [f64; 2] {
+    let workspace = Workspace::new(&format!("{ESTIMATE}\n{robot}"));
+    let output = workspace.run_virtual(&[]);
+    assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+    let estimate = &workspace.summary()["figures"]["bite_estimate"];
+    ["error_rms_n", "covered"].map(|figure| estimate[figure].as_f64().unwrap())
+}
+
+#[test]
+fn the_stated_uncertainty_covers_robots_with_another_friction_than_the_model() {
+    let robots = [
+        ("", "slide_friction_n = 6.5\nviscous_friction_n_s_per_m = 26.0"),
+        ("model = 'lugre'", ""),
+        ("model = 'lugre'\nbreakaway_ratio = 1.6", "slide_friction_n = 6.5\nviscous_friction_n_s_per_m = 26.0"),
+        ("leg_screw_efficiency = 0.8\nslide_screw_efficiency = 0.8", ""),
+    ];
+    for (friction, dynamics) in robots {
+        let robot = format!("[controller.model]\n[dynamics]\n{dynamics}\n[dynamics.friction]\n{friction}");
+        let [_, covered] = error_and_coverage(&robot);
+        assert!(covered >= 0.95, "{robot}: {covered}");
+    }
+}
+
+#[test]
+fn bristles_in_the_model_find_the_friction_of_axes_at_rest() {
+    let [known, unknown] = ["", "[controller.model]"]
+        .map(|model| error_and_coverage(&format!("{model}\n[dynamics.friction]\nmodel = 'lugre'")));
+    assert!(known[0] < 1.0 && unknown[0] > 2.0, "{known:?} {unknown:?}");
+}
+
 /// Bites of 25 N on soft food, with a damping for food as soft as nothing.
 fn hold(damping_n_s_per_m: f64) -> String {
     let example = include_str!("../examples/force_control.toml");

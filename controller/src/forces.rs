@@ -1,15 +1,18 @@
 //! Forces by the controller's own model of the mechanism: the model, the observer of external forces, and
 //! feed-forward. Nothing here controls a force.
 
-use masseter_model::dynamics::{Bodies, Equations, Friction, Loads, Motion, Reactions};
+use masseter_model::dynamics::{Bodies, Equations, Friction, FrictionModel, Loads, Motion, Reactions};
 use masseter_model::geometry::{AXES, Mechanism, Pose, Twist};
 use masseter_runtime::messages::Reading;
 use masseter_runtime::named::Signal;
 use masseter_scenario::{ForceEstimateConfig, Scenario};
-use nalgebra::Vector6;
+use self::calibration::Calibration;
+use nalgebra::{SVector, Vector6};
 
 use crate::pose_law::{Detour, ExternalForce, PoseLaw};
 use crate::sequencer::Sequencer;
+
+mod calibration;
 
 /// Passes until friction and loads agree: friction depends on loads, and loads on the drives' forces less friction. The
 /// first pass is exact for the screws of sliding axes; the others are for guides, and for axes near rest.
@@ -109,6 +112,7 @@ pub(crate) struct Model {
     pub(crate) mechanism: Mechanism,
     bodies: Bodies,
     friction: Friction,
+    law: FrictionModel,
 }
 
 /// Friction in a motion.
@@ -118,6 +122,8 @@ struct Braking {
     axes_n: Vector6<f64>,
     /// The largest friction of an axis at rest, without its breakaway, N.
     coulomb_n: Vector6<f64>,
+    /// Force that the screw of an axis transmits, N.
+    screw_n: Vector6<f64>,
     /// Wrench of hinges and ball joints on the platform, N and N m.
     joints: Vector6<f64>,
 }
@@ -126,7 +132,7 @@ impl Model {
     /// The model that the controller of a scenario assumes.
     pub(crate) fn new(scenario: &Scenario, mechanism: Mechanism) -> Self {
         let config = scenario.model();
-        Self { mechanism, bodies: Bodies::from(&config), friction: Friction::new(&config) }
+        Self { mechanism, bodies: Bodies::from(&config), friction: Friction::new(&config), law: config.friction.model }
     }
 
     /// The motion of a pose and a twist (m/s, rad/s); none for a pose without joint coordinates.
@@ -147,31 +153,39 @@ impl Model {
         let loads = Reactions::new(&self.bodies, motion, acceleration, &moved_n).loads(&moved_n);
         let in_joints = self.friction.joint_damping(&loads, motion) * motion.twist;
         let moved_n = equations.inverse(acceleration, &(wrench - in_joints))?;
-        Some(moved_n + self.drag_n(&loads, motion))
+        Some(moved_n + self.drag_n(&loads, motion, None))
     }
 
-    /// Friction in a motion with these forces of the drives, N. The loads ignore the acceleration of the motion.
-    fn braking(&self, motion: &Motion, driven_n: &Vector6<f64>) -> Braking {
+    /// Friction in a motion with these forces of the drives, N. The loads ignore the acceleration of the motion. Bristles
+    /// carry these shares of Coulomb friction; without bristles friction follows the speed.
+    fn braking(&self, motion: &Motion, driven_n: &Vector6<f64>, bristles: Option<&Vector6<f64>>) -> Braking {
         let (mut axes_n, mut loads) = (Vector6::zeros(), Loads::default());
         for _ in 0..LOAD_PASSES {
             let moved_n = driven_n - axes_n;
             loads = Reactions::new(&self.bodies, motion, &Twist::zeros(), &moved_n).loads(&moved_n);
             // A screw takes a share of the rest: the whole step would overshoot by this share.
-            let missing_n = self.drag_n(&loads, motion) - axes_n;
+            let missing_n = self.drag_n(&loads, motion, bristles) - axes_n;
             axes_n += Vector6::from_fn(|axis, _| missing_n[axis] / (1.0 + self.friction.screw_loss(axis)));
         }
         Braking {
             axes_n,
             coulomb_n: self.friction.coulomb_n(&loads).into(),
+            screw_n: loads.screw_n.into(),
             joints: self.friction.joint_damping(&loads, motion) * -motion.twist,
         }
     }
 
     /// Forces that overcome the friction of the axes, N.
-    fn drag_n(&self, loads: &Loads, motion: &Motion) -> Vector6<f64> {
-        Vector6::from(self.friction.coulomb_n(loads)).zip_map(&motion.rates_m_s, |coulomb_n, speed_m_s| {
-            self.friction.drag_n_s_per_m(coulomb_n, speed_m_s) * speed_m_s
-        })
+    fn drag_n(&self, loads: &Loads, motion: &Motion, bristles: Option<&Vector6<f64>>) -> Vector6<f64> {
+        let coulomb_n = Vector6::from(self.friction.coulomb_n(loads));
+        match bristles {
+            Some(shares) => {
+                coulomb_n.component_mul(shares) + motion.rates_m_s * self.friction.viscous_n_s_per_m()
+            }
+            None => coulomb_n.zip_map(&motion.rates_m_s, |coulomb_n, speed_m_s| {
+                self.friction.drag_n_s_per_m(coulomb_n, speed_m_s) * speed_m_s
+            }),
+        }
     }
 }
 
@@ -226,8 +240,14 @@ struct ForceObserver {
     /// A step of the reported force, N.
     step_n: Vector6<f64>,
     last: Option<Interval>,
+    calibration: Calibration,
+    /// `lugre`: deflections of the axes' bristles, m.
+    bristles_m: Vector6<f64>,
     /// r: force (N) and moment (N m) on the platform, base axes.
     residual: Vector6<f64>,
+    /// The vertical force behind the same low-pass once more, N: as late behind the estimate as the estimate behind the
+    /// force.
+    late_n: f64,
     uncertainty_n: f64,
 }
 
@@ -257,26 +277,32 @@ impl ForceObserver {
     }
 
     fn new(scenario: &Scenario, model: Model) -> Self {
+        let (config, period_s) = (scenario.force_estimate.unwrap_or_default(), scenario.period_s());
+        let samples = (config.calibration_s / period_s).round() as u64;
         Self {
             model,
-            config: scenario.force_estimate.unwrap_or_default(),
-            period_s: scenario.period_s(),
+            config,
+            period_s,
+            calibration: Calibration::new(samples, config.rest_speed_m_s),
             step_n: Vector6::from_fn(|axis, _| scenario.drives.of_axis(axis).rated_force_n / STEPS),
             last: None,
+            bristles_m: Vector6::zeros(),
             residual: Vector6::zeros(),
+            late_n: 0.0,
             uncertainty_n: f64::INFINITY,
         }
     }
 
     /// Clears the observer: the drives' forces have no meaning while brakes hold the axes.
     fn reset(&mut self) {
-        (self.last, self.residual, self.uncertainty_n) = (None, Vector6::zeros(), f64::INFINITY);
+        (self.last, self.residual, self.late_n) = (None, Vector6::zeros(), 0.0);
+        (self.bristles_m, self.uncertainty_n) = (Vector6::zeros(), f64::INFINITY);
     }
 
-    /// The estimate; none before two intervals.
+    /// The estimate; none before two intervals, or before the calibration is complete.
     fn external(&self) -> Option<ExternalForce> {
         let [x, y, z, moment_x, moment_y, moment_z] = self.residual.into();
-        let is_known = self.uncertainty_n.is_finite();
+        let is_known = self.uncertainty_n.is_finite() && self.calibration.is_complete();
         is_known.then_some(ExternalForce {
             force_n: [x, y, z],
             moment_nm: [moment_x, moment_y, moment_z],
@@ -292,37 +318,90 @@ impl ForceObserver {
         let twist = twist_between(&last.pose, pose, self.period_s);
         let Some(motion) = self.model.motion(pose, &twist) else { return };
         let force_n = Vector6::from(*force_n);
-        let braking = self.model.braking(&motion, &force_n);
-        let wrench = motion.jacobian.actuators.tr_mul(&(force_n - braking.axes_n)) + braking.joints;
+        let bristles = self.bristles(&motion);
+        let braking = self.model.braking(&motion, &force_n, bristles.as_ref());
+        let braked_n = braking.axes_n + self.calibration.beside_model_n(&motion.rates_m_s);
+        let wrench = motion.jacobian.actuators.tr_mul(&(force_n - braked_n)) + braking.joints;
         let driven = Driven { twist, wrench };
         self.last = Some(Interval { cycle, pose: *pose, driven: Some(driven) });
         if let Some(before) = last.driven {
-            self.observe(&motion, &before, &driven);
-            self.uncertainty_n = self.bite_uncertainty_n(&motion, &braking);
+            let weight_n = self.observe(&motion, &before, &driven);
+            let loads_n = [&braking.coulomb_n, &braking.screw_n];
+            self.calibration.take_sample(&motion.jacobian.actuators, &self.residual, &motion.rates_m_s, loads_n);
+            // A doubt stays in the estimate as long as a force does.
+            let now_n = self.bite_uncertainty_n(&motion, &braking, weight_n);
+            let before_n = if self.uncertainty_n.is_finite() { self.uncertainty_n } else { now_n };
+            self.uncertainty_n = before_n + (now_n - before_n) * self.share();
         }
     }
 
-    /// Between the middles of two intervals the momentum gains M ΔV.
-    fn observe(&mut self, motion: &Motion, before: &Driven, driven: &Driven) {
+    /// Shares of Coulomb friction that the axes' bristles carry; none with another law of friction.
+    fn bristles(&mut self, motion: &Motion) -> Option<Vector6<f64>> {
+        let (friction, period_s) = (&self.model.friction, self.period_s);
+        (self.model.law == FrictionModel::Lugre).then(|| {
+            self.bristles_m.zip_apply(&motion.rates_m_s, |bristles_m, speed_m_s| {
+                *bristles_m = (*bristles_m + period_s * speed_m_s) / friction.slip(speed_m_s, period_s);
+            });
+            self.bristles_m / friction.bristle_deflection_m()
+        })
+    }
+
+    /// Share of what is new that the low-pass takes in a period.
+    fn share(&self) -> f64 {
+        self.period_s / (self.period_s + self.config.observer_time_s)
+    }
+
+    /// Between the middles of two intervals the momentum gains M ΔV. Returns the vertical part of weight and inertia, N.
+    fn observe(&mut self, motion: &Motion, before: &Driven, driven: &Driven) -> f64 {
         let Equations { mass, bias, .. } = Equations::new(&self.model.bodies, motion);
         let gained = mass * (driven.twist - before.twist) / self.period_s;
         let acting = (before.wrench + driven.wrench) / 2.0 - bias;
-        let share = self.period_s / (self.period_s + self.config.observer_time_s);
+        let share = self.share();
         self.residual += (gained - acting - self.residual) * share;
+        self.late_n += (self.residual[2] - self.late_n) * share;
+        bias[2]
     }
 
-    fn bite_uncertainty_n(&self, motion: &Motion, braking: &Braking) -> f64 {
-        let Self { config, step_n, .. } = self;
-        let vertical = motion.jacobian.actuators.column(2);
-        let (mut friction, mut variance) = (0.0, 0.0);
-        for axis in 0..AXES {
-            let is_at_rest = motion.rates_m_s[axis].abs() < config.rest_speed_m_s;
-            let moving_n = config.friction_uncertainty * braking.axes_n[axis].abs();
-            let doubt_n = if is_at_rest { braking.coulomb_n[axis] } else { moving_n };
-            friction += vertical[axis].abs() * doubt_n;
-            variance += (vertical[axis] * step_n[axis]).powi(2) * ROUNDING_VARIANCE;
-        }
-        friction + 2.0 * variance.sqrt()
+    /// The terms are independent of each other, so their squares add. A term has the same cause on all axes, whose doubts
+    /// therefore add in size.
+    fn bite_uncertainty_n(&self, motion: &Motion, braking: &Braking, weight_n: f64) -> f64 {
+        let Self { config, model: Model { friction, .. }, step_n, .. } = self;
+        let vertical = motion.jacobian.actuators.column(2).abs();
+        let losses = Vector6::from_fn(|axis, _| friction.screw_doubt(axis, config.screw_uncertainty));
+        let loads_n = [&braking.coulomb_n, &braking.screw_n];
+        let calibrated = self.calibration.doubts_n(&motion.rates_m_s, loads_n);
+        let of_friction = match calibrated {
+            Some([left_n, loaded_n]) => {
+                [vertical.dot(&left_n), vertical.dot(&loaded_n.component_mul(&losses)), 0.0, 0.0, 0.0, 0.0]
+            }
+            None => {
+                let speeds_m_s = motion.rates_m_s.abs();
+                let unloaded_n = Vector6::from(friction.coulomb_n(&Loads::default()));
+                let share = config.friction_uncertainty;
+                [
+                    vertical.dot(&self.law_doubt_n(&speeds_m_s, &braking.coulomb_n)),
+                    vertical.dot(&braking.screw_n.component_mul(&losses)),
+                    share * vertical.dot(&unloaded_n),
+                    share * friction.viscous_n_s_per_m() * vertical.dot(&speeds_m_s),
+                    share * braking.joints[2],
+                    config.mass_uncertainty * weight_n,
+                ]
+            }
+        };
+        let rounding_n = vertical.component_mul(step_n).norm() * ROUNDING_VARIANCE.sqrt();
+        let late_n = self.residual[2] - self.late_n;
+        SVector::from(of_friction).norm().hypot(late_n).hypot(2.0 * rounding_n)
+    }
+
+    /// By how much the friction of axes with these speeds (m/s) may differ where another law holds, N: an axis near rest may
+    /// be held in either direction, and breaks away from a larger force.
+    fn law_doubt_n(&self, speeds_m_s: &Vector6<f64>, coulomb_n: &Vector6<f64>) -> Vector6<f64> {
+        let friction = &self.model.friction;
+        let excess = friction.breakaway_ratio() - 1.0 + self.config.breakaway_uncertainty;
+        coulomb_n.zip_map(speeds_m_s, |coulomb_n, speed_m_s| {
+            let breaking = (-(speed_m_s / friction.breakaway_speed_m_s()).powi(2)).exp();
+            coulomb_n * (self.calibration.rest(speed_m_s) + excess) * breaking
+        })
     }
 }
 

@@ -9,6 +9,7 @@ use masseter_runtime::messages::{Event, FrameTap, Message, Reading, State, Truth
 use masseter_runtime::named::{Declared, PlayedMotion};
 use masseter_scenario::{ChecksConfig, FaultKindConfig, Scenario};
 
+use crate::bite_estimate::BiteEstimateWatch;
 use crate::declared_faults::FaultWatch;
 use crate::events::{Code, EventRecord};
 use crate::figures::Figures;
@@ -83,6 +84,8 @@ pub struct Analysis {
     /// None where the scenario plays no recording.
     recorded: Option<RecordedWatch>,
     contact: ContactWatch,
+    /// None where the force is not estimated, or has no truth.
+    bite_estimate: Option<BiteEstimateWatch>,
     /// `None` if the scenario requires nothing.
     requirements: Option<Requirements>,
     /// What needs no collector.
@@ -147,6 +150,7 @@ impl Analysis {
                 .then(|| RecordedWatch::of_scenario(scenario))
                 .flatten(),
             contact: ContactWatch::default(),
+            bite_estimate: is_emulated.then(|| BiteEstimateWatch::new(declared)).flatten(),
             requirements: (!requirements.is_empty()).then_some(requirements),
             figures: Figures {
                 frames: scenario.recording.frames.then(Vec::new),
@@ -287,6 +291,7 @@ impl Analysis {
             let is_excused = messages.is_disturbed && self.controller_skips.figures.worked_ns > 0;
             self.played.add_reading(reading, messages.controller_state, is_excused);
         }
+        self.bite_estimate.iter_mut().for_each(|estimate| estimate.add(messages));
         self.requirements.iter_mut().for_each(|requirements| requirements.judge_sample(sample));
     }
 
@@ -363,6 +368,7 @@ impl Analysis {
             signals: self.named.signals,
             parameters: self.named.parameters,
             contact: self.contact.into_figures(),
+            bite_estimate: self.bite_estimate.and_then(BiteEstimateWatch::into_figures),
             topics,
             bus_response: self.responses.into_figures(missing_frames),
             cut_short,

@@ -7,6 +7,7 @@ use masseter_recording::Damage;
 use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind};
 use serde::Serialize;
 
+use crate::bite_estimate::BiteEstimateFigures;
 use crate::breach::PathBreach;
 use crate::declared_faults::FaultFigures;
 use crate::events::{Code, EventRecord};
@@ -98,6 +99,9 @@ pub struct Figures {
     /// The greatest vertical force of food and upper teeth on the emulated jaw, N; `None` if the jaws cannot touch,
     /// and on the robot.
     pub bite_force_max_n: Option<f64>,
+    /// The controller's estimate of this force beside the true one; `None` without an estimate, and on the robot.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bite_estimate: Option<BiteEstimateFigures>,
     /// What the lower teeth bore; `None` if the jaws cannot touch, and on the robot.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub contact: Option<ContactFigures>,

@@ -5,6 +5,7 @@
 
 mod ahead;
 mod analysis;
+mod bite_estimate;
 mod breach;
 mod check;
 mod checks;
@@ -42,6 +43,7 @@ mod verdict;
 mod watch;
 
 pub use analysis::Analysis;
+pub use bite_estimate::BiteEstimateFigures;
 pub use breach::{Breach, PathBreach};
 pub use check::{Check, CheckFigures, CheckResult};
 pub use checks::whose_motion;

@@ -82,7 +82,7 @@ impl Braking {
     /// F = σ₀ z + σ₁ ż + σ₂ v.
     fn bristled(&self, axis: usize, coulomb_n: f64, speed_m_s: f64, step_s: f64) -> Element {
         let stiffness_n_per_m = coulomb_n / self.config.bristle_deflection_m;
-        let slip = self.slip(speed_m_s, step_s);
+        let slip = self.law.slip(speed_m_s, step_s);
         let z_m = self.bristles[axis].deflection_m;
         let next_m = (z_m + step_s * speed_m_s) / slip;
         // The damping fades with speed, so that sliding bristles do not drive the axis.
@@ -100,13 +100,6 @@ impl Braking {
         }
     }
 
-    /// The bristles' deflection after a step is (z + h v) / slip: ż = v − |v| z/z_max, implicit in z.
-    fn slip(&self, speed_m_s: f64, step_s: f64) -> f64 {
-        let FrictionConfig { bristle_deflection_m, breakaway_ratio, breakaway_speed_m_s, .. } = self.config;
-        let excess = (breakaway_ratio - 1.0) * (-(speed_m_s / breakaway_speed_m_s).powi(2)).exp();
-        1.0 + step_s * speed_m_s.abs() / (bristle_deflection_m * (1.0 + excess))
-    }
-
     /// The damping of hinges and ball joints against the platform's twist: their friction is its product with the twist.
     pub(super) fn of_joints(&self, motion: &Motion) -> Matrix6<f64> {
         self.law.joint_damping(&self.loads, motion)
@@ -119,7 +112,7 @@ impl Braking {
             return;
         }
         for axis in 0..AXES {
-            let slip = self.slip(speeds_m_s[axis], step_s);
+            let slip = self.law.slip(speeds_m_s[axis], step_s);
             let bristles = &mut self.bristles[axis];
             bristles.deflection_m = (bristles.deflection_m + step_s * speeds_m_s[axis]) / slip;
         }

@@ -4,6 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use masseter_judge::{
+    BiteEstimateFigures,
     AxisFigures, BusResponse, EventRecord, Figures, IntervalFigures, PoseErrors, ReadingFigures,
     ResponseFigures, TopicFigures, TrackingFigures, Verdict, whose_motion,
 };
@@ -128,12 +129,27 @@ fn write_figures(text: &mut String, manifest: &Manifest, figures: &Figures) -> s
     if let Some(most_n) = figures.bite_force_max_n {
         writeln!(text, "bite force: at most {most_n:.1} N")?;
     }
+    if let Some(estimate) = &figures.bite_estimate {
+        writeln!(text, "bite force, estimated: {}", estimated(estimate))?;
+    }
     let heads = ["interval, µs", "n", "p50", "p99", "p99.9", "max"];
     let latencies = text::table([28, 8, 10, 10, 10, 10], heads, figures.intervals.iter().map(latency));
     write!(text, "\n{latencies}{}", responses(&figures.bus_response))?;
     writeln!(text, "\nskipped {}\n{}", skips(figures), readings(&figures.readings))?;
     usage(text, &manifest.usage)?;
     losses(text, figures)
+}
+
+/// The estimate of the bite force with its uncertainty.
+pub(crate) fn estimated(estimate: &BiteEstimateFigures) -> String {
+    let BiteEstimateFigures { error_rms_n, uncertainty_median_n, covered, phantom_n, .. } = estimate;
+    let phantom = phantom_n.map_or_else(String::new, |most_n| {
+        format!("; without contact below {most_n:.1} N in 95 % of the cycles")
+    });
+    let share = covered * 100.0;
+    format!(
+        "error {error_rms_n:.1} N rms, stated ± {uncertainty_median_n:.1} N (median), which covers {share:.1} % of the cycles{phantom}"
+    )
 }
 
 /// Name, number of samples, median, 99 %, 99.9 % and greatest of an interval, µs.

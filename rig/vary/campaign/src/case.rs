@@ -1,6 +1,6 @@
 //! A case: a whole scenario with its number and its identity, and what came of it, as it is kept.
 
-use masseter_judge::{Check, CheckResult, Figures, Verdict};
+use masseter_judge::{BiteEstimateFigures, Check, CheckResult, Figures, Verdict};
 use masseter_scenario::Scenario;
 use masseter_table::Values;
 use serde::{Deserialize, Serialize};
@@ -38,6 +38,21 @@ pub(crate) const COLUMNS: [&[ResultColumn]; 3] = [
             numbers(all, |case| case.rotation_max_deg)
         }),
         ("bite_force_max_n", "N", "greatest bite force", |all| numbers(all, |case| case.bite_force_max_n)),
+        ("bite_error_rms_n", "N", "error of the estimated bite force, root mean square", |all| {
+            numbers(all, |case| case.bite_estimate.map(|of| of.error_rms_n))
+        }),
+        ("bite_error_median_n", "N", "its median, without its sign", |all| {
+            numbers(all, |case| case.bite_estimate.map(|of| of.error_median_n))
+        }),
+        ("bite_uncertainty_median_n", "N", "median of the stated uncertainty", |all| {
+            numbers(all, |case| case.bite_estimate.map(|of| of.uncertainty_median_n))
+        }),
+        ("bite_covered", "", "share of the cycles in which the uncertainty is at least the error", |all| {
+            numbers(all, |case| case.bite_estimate.map(|of| of.covered))
+        }),
+        ("bite_phantom_n", "N", "estimate that 95 % of the cycles without contact are below", |all| {
+            numbers(all, |case| case.bite_estimate.and_then(|of| of.phantom_n))
+        }),
     ],
 ];
 
@@ -115,6 +130,9 @@ pub struct CaseResult {
     pub rotation_max_deg: Option<f64>,
     /// The greatest bite force, N.
     pub bite_force_max_n: Option<f64>,
+    /// The estimate of the bite force beside the true one; results of older campaigns have none.
+    #[serde(default)]
+    pub bite_estimate: Option<BiteEstimateFigures>,
     /// The time that it took, s.
     pub took_s: f64,
 }
@@ -136,6 +154,7 @@ impl CaseResult {
             incisal_max_mm: errors.incisal_max_mm,
             rotation_max_deg: errors.max_deg,
             bite_force_max_n: figures.bite_force_max_n,
+            bite_estimate: figures.bite_estimate,
             took_s,
             ..Self::without_run(case, verdict.word, verdict.exit_code as u8, verdict.reason.clone())
         }

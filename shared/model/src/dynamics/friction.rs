@@ -105,6 +105,21 @@ impl Friction {
         1.0 / efficiency - 1.0
     }
 
+    /// By how much this share changes where the efficiency differs by `doubt`.
+    pub fn screw_doubt(&self, axis: usize, doubt: f64) -> f64 {
+        doubt * (1.0 + self.screw_loss(axis)).powi(2)
+    }
+
+    /// Breakaway friction divided by Coulomb friction.
+    pub fn breakaway_ratio(&self) -> f64 {
+        self.config.breakaway_ratio
+    }
+
+    /// Speed at which breakaway friction is reached, m/s.
+    pub fn breakaway_speed_m_s(&self) -> f64 {
+        self.config.breakaway_speed_m_s
+    }
+
     /// Friction divided by speed, N per m/s: Stribeck curve and viscous friction,
     /// F = √(2e)(F_s − F_c) exp(−(v/v_S)²) v/v_S + F_c tanh(v/v_C) + f v with v_S = √2 v_b and v_C = v_b/10 (MathWorks,
     /// Translational Friction).
@@ -118,6 +133,19 @@ impl Friction {
         // tanh x / x, which is 1 at rest.
         let coulomb = coulomb_n / coulomb_m_s * if ratio > 1e-6 { ratio.tanh() / ratio } else { 1.0 };
         stribeck + coulomb + self.viscous_n_s_per_m
+    }
+
+    /// `lugre`: how much the bristles slip in a step (s) at a speed (m/s). Their deflection z after a step h is (z + h v) /
+    /// slip: ż = v − |v| z/z_max, implicit in z.
+    pub fn slip(&self, speed_m_s: f64, step_s: f64) -> f64 {
+        let FrictionConfig { bristle_deflection_m, breakaway_ratio, breakaway_speed_m_s, .. } = self.config;
+        let excess = (breakaway_ratio - 1.0) * (-(speed_m_s / breakaway_speed_m_s).powi(2)).exp();
+        1.0 + step_s * speed_m_s.abs() / (bristle_deflection_m * (1.0 + excess))
+    }
+
+    /// `lugre`: the deflection of bristles that carry Coulomb friction, m.
+    pub fn bristle_deflection_m(&self) -> f64 {
+        self.config.bristle_deflection_m
     }
 
     /// Viscous friction of an axis, N per m/s.

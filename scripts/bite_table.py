@@ -1,0 +1,53 @@
+"""Error, stated uncertainty and coverage of the estimated bite force in a campaign, as the table of docs/dynamics-control.md.
+
+    bite_table.py FOLDER [LEAST]
+
+The folder is that of a campaign of examples/campaign/bite_force.toml with `cases.parquet`. Fails where the uncertainty covers a
+smaller share of the cycles than LEAST.
+"""
+
+import pathlib
+import sys
+
+import duckdb
+
+LAW, FOOD = '"dynamics.friction.model"', '"stimulus.bite.food.kind"'
+GROUPS = {
+    "all": "true",
+    "robots `smooth`": f"{LAW} = 'smooth'",
+    "robots `lugre`": f"{LAW} = 'lugre'",
+    "soft food": f"{FOOD} = 'soft'",
+    "peanut": f"{FOOD} = 'peanut'",
+    "gum": f"{FOOD} = 'gum'",
+}
+CALIBRATED = {"without": "= 0", "with": "> 0"}
+# Heading, value and decimals.
+COLUMNS = [
+    ("runs", "count(bite_covered)", 0),
+    ("error rms, N", "sqrt(avg(bite_error_rms_n ** 2))", 1),
+    ("median error, N", "median(bite_error_median_n)", 1),
+    ("median uncertainty, N", "median(bite_uncertainty_median_n)", 1),
+    ("uncertainty by error", "median(bite_uncertainty_median_n) / median(bite_error_median_n)", 1),
+    ("cycles covered, %", "100 * avg(bite_covered)", 1),
+    ("phantom, N", "median(bite_phantom_n)", 1),
+    ("largest phantom, N", "max(bite_phantom_n)", 1),
+]
+
+
+def main() -> None:
+    table, least = pathlib.Path(sys.argv[1], "cases.parquet"), float(sys.argv[2]) if len(sys.argv) > 2 else 0.0
+    values = ", ".join(value for _, value, _ in COLUMNS)
+    print("| robots | calibration | " + " | ".join(heading for heading, _, _ in COLUMNS) + " |")
+    print("| --- | --- |" + " ---: |" * len(COLUMNS))
+    for name, group in GROUPS.items():
+        for calibration, size in CALIBRATED.items():
+            where = f'{group} AND "force_estimate.calibration_s" {size}'
+            row = duckdb.sql(f"SELECT {values} FROM '{table}' WHERE {where}").fetchone()
+            cells = [f"{value:.{decimals}f}" for value, (_, _, decimals) in zip(row, COLUMNS, strict=True)]
+            print(f"| {name} | {calibration} | " + " | ".join(cells) + " |")
+    covered, runs = duckdb.sql(f"SELECT avg(bite_covered), count(bite_covered) FROM '{table}'").fetchone()
+    if not runs or covered < least:
+        sys.exit(f"{table}: {runs} runs with an estimate, whose uncertainty covers {covered}; demanded {least}")
+
+
+main()
