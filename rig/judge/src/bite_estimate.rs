@@ -36,7 +36,8 @@ pub struct BiteEstimateFigures {
 pub(super) struct BiteEstimateWatch {
     /// Places of the two signals.
     places: [usize; 2],
-    squares_n2: f64,
+    /// Root of the sum of the squared errors, N: also of huge ones the root is a number.
+    root_n: f64,
     covered: u64,
     errors: Histogram<u64>,
     uncertainties: Histogram<u64>,
@@ -51,7 +52,7 @@ impl BiteEstimateWatch {
         let histogram = || Histogram::new(DIGITS).expect("three digits are allowed");
         let [errors, uncertainties, phantoms] = std::array::from_fn(|_| histogram());
         let places = [estimate, uncertainty];
-        Some(Self { places, squares_n2: 0.0, covered: 0, errors, uncertainties, phantoms })
+        Some(Self { places, root_n: 0.0, covered: 0, errors, uncertainties, phantoms })
     }
 
     /// Takes a cycle of the motion that has estimate and truth.
@@ -68,7 +69,7 @@ impl BiteEstimateWatch {
                 .record((value_n * STEPS_PER_N) as u64)
                 .expect("a histogram that resizes itself takes any value");
         };
-        self.squares_n2 += error_n * error_n;
+        self.root_n = self.root_n.hypot(error_n);
         self.covered += u64::from(error_n <= uncertainty_n);
         record(&mut self.errors, error_n);
         record(&mut self.uncertainties, uncertainty_n);
@@ -82,7 +83,7 @@ impl BiteEstimateWatch {
         let count = self.errors.len();
         let at = |histogram: &Histogram<u64>, quantile| histogram.value_at_quantile(quantile) as f64 / STEPS_PER_N;
         (count > 0).then(|| BiteEstimateFigures {
-            error_rms_n: (self.squares_n2 / count as f64).sqrt(),
+            error_rms_n: self.root_n / (count as f64).sqrt(),
             error_median_n: at(&self.errors, 0.5),
             uncertainty_median_n: at(&self.uncertainties, 0.5),
             covered: self.covered as f64 / count as f64,
