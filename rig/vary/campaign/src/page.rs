@@ -79,7 +79,10 @@ fn margins(report: &Report<'_>, worst: &[WorstCase]) -> Option<Section> {
         axes.map(chart).collect::<Vec<_>>()
     };
     let plots: Vec<_> = check_names(&report.results).iter().flat_map(drawn).collect();
-    let about = Block::text("margins-about", "A dot is a case. A click opens its report, or its result where no run was recorded.");
+    let about = Block::text(
+        "margins-about",
+        "A dot is a case. A click opens its report, or its result where no run was recorded.",
+    );
     let blocks: Vec<_> = [about].into_iter().chain(plots).collect();
     (blocks.len() > 1).then(|| Section::new("margins", "Margin against each factor", blocks))
 }

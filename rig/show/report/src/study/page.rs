@@ -4,8 +4,8 @@
 
 use masseter_judge::CoursePoint;
 use masseter_page::{
-    Across, Block, Chart, Column, Content, Life, Page, PageError, Points, Scale, Section, Series,
-    Style, Table, Time,
+    Across, Block, Chart, Column, Content, Life, Page, PageError, Points, Scale, Section, Series, Style,
+    Table, Time,
 };
 
 use super::figures::{Figure, band, groups, percent};
@@ -80,7 +80,10 @@ fn recordings(study: &Study) -> Block {
         Column::texts(&["person", "condition", "rig", "cycles that count"]),
         Column::numbers(&["left out", "unclear", "most closed, mm open"]),
     ];
-    Block::table("recordings", Table::new("Table of recordings", columns, study.recordings.iter().map(recording_cells)))
+    Block::table(
+        "recordings",
+        Table::new("Table of recordings", columns, study.recordings.iter().map(recording_cells)),
+    )
 }
 
 fn recording_cells(of: &Recorded) -> [String; 7] {
