@@ -378,7 +378,7 @@ def sections(claims: list) -> list[dict]:
     settings = table("settings").iloc[0]
     text = lambda name, words: {"id": name, "kind": "text", "data": words}
     tone = {"holds": "good", "holds partly": "doubtful", "does not hold": "bad"}
-    figure = lambda claim: {"text": claim.figure, "href": f"#{claim.figure}.svg"} if claim.figure else ""
+    figure = lambda claim: {"text": "figure", "href": f"#{claim.figure}.svg"} if claim.figure else ""
     rows = [[str(number), claim.statement, claim.section, claim.measured, claim.criterion,
              {"mark": claim.verdict, "tone": tone[claim.verdict]}, figure(claim)] for number, claim in enumerate(claims, 1)]
     return [
