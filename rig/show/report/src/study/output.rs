@@ -5,15 +5,15 @@ use std::fs::{self, File};
 use std::path::Path;
 
 use anyhow::Context;
-use masseter_judge::{COURSE_POINTS, Statistic};
+use masseter_judge::Statistic;
 use masseter_scenario::wording::counted;
-use masseter_table::{Cell, Column as TableColumn, Format, Table, write_table};
+use masseter_table::{Cell, Column, Format, Table, write_table};
 
-use super::figures::{figures, groups};
-use super::page::html;
+use super::figures::{figures, groups, percent};
+use super::page::{difference_cells, html};
 use super::{Difference, Measure, Study, means};
 use crate::jaw_table::{jaw_cycle_table, number, recording_cells, recording_columns, whole, word, words};
-use crate::text::{self, or_dash, significant};
+use crate::text;
 
 /// The meaning of a column.
 const GROUP: &str = "Kind and side of the cycles.";
@@ -60,7 +60,7 @@ fn cycles(study: &Study) -> Table {
 }
 
 /// Columns of a statistic, whose unit is in a column of its own.
-fn statistic_columns(of: &str) -> [TableColumn; 7] {
+fn statistic_columns(of: &str) -> [Column; 7] {
     [
         whole("n", &format!("Number of {of}.")),
         number("mean", "", "Their mean, in the unit of the row."),
@@ -79,7 +79,7 @@ fn statistic_cells(of: &Statistic) -> [Cell; 7] {
 }
 
 /// Columns of a group of cycles, and of a quantity of theirs.
-fn measure_columns() -> [TableColumn; 3] {
+fn measure_columns() -> [Column; 3] {
     [
         words("group", GROUP),
         words("quantity", "Key of the quantity in the table of cycles."),
@@ -118,12 +118,11 @@ pub(super) fn courses(study: &Study) -> Table {
         for group in &of.jaw.groups {
             for (point, [mean, sd]) in group.mean_course.iter().enumerate() {
                 let first = recording_cells(of.names(), recording).into_iter().chain([word(&group.name)]);
-                let share = 100.0 * point as f64 / (COURSE_POINTS - 1) as f64;
                 // One course has no spread.
                 let [opening_sd_mm, lateral_sd_mm] = [sd.opening_mm, sd.lateral_mm]
                     .map(|sd_mm| Some(sd_mm).filter(|_| group.courses.len() > 1));
                 let [opening_mm, lateral_mm] = [mean.opening_mm, mean.lateral_mm].map(Some);
-                let values = [Some(share), opening_mm, opening_sd_mm, lateral_mm, lateral_sd_mm];
+                let values = [Some(percent(point)), opening_mm, opening_sd_mm, lateral_mm, lateral_sd_mm];
                 table.push(first.chain(values.map(Cell::Number)));
             }
         }
@@ -174,26 +173,6 @@ fn caption(study: &Study, differences: &[Difference]) -> String {
          out, and cycles are pooled within a kind and a side only. Curves: mean ± SD of the recordings' mean courses; of a single recording, of \
          its cycles.{tested}\n"
     )
-}
-
-fn interval(of: &Statistic) -> String {
-    let ends = of.mean_low.zip(of.mean_high);
-    or_dash(ends, |(low, high)| format!("{} to {}", significant(low), significant(high)))
-}
-
-pub(super) fn difference_cells(
-    Difference { measure, from, to, statistic, effect }: &Difference,
-) -> [String; 8] {
-    [
-        measure.group.clone(),
-        format!("{}, {}", measure.of.about, measure.of.unit),
-        format!("{from} to {to}"),
-        or_dash(statistic.mean, significant),
-        interval(statistic),
-        or_dash(statistic.sd, significant),
-        or_dash(*effect, |g| format!("{g:.2}")),
-        statistic.count.to_string(),
-    ]
 }
 
 /// The differences that a terminal shows, a line each.

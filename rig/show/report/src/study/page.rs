@@ -2,16 +2,15 @@
 //!
 //! The page has no link to a run: names of folders may be names of persons.
 
-use masseter_judge::CoursePoint;
+use masseter_judge::{CoursePoint, Statistic};
 use masseter_page::{
     Across, Block, Chart, Column, Content, Life, Page, PageError, Points, Scale, Section, Series, Style,
     Table, Time,
 };
 
 use super::figures::{Figure, band, groups, percent};
-use super::output::difference_cells;
 use super::{Difference, Recorded, Study};
-use crate::text::or_dash;
+use crate::text::{or_dash, significant};
 
 /// Of this figure no chart shows the same.
 const PATHS: &str = "paths-170mm.svg";
@@ -45,6 +44,27 @@ pub(super) fn html(
         format!("{} recordings by {} and {}", study.recordings.len(), study.by.person, study.by.condition);
     let page = Page::new("Jaw motion compared", Life::Finished, Time::default());
     Page { about, sections, ..page }.to_html()
+}
+
+fn interval(of: &Statistic) -> String {
+    let ends = of.mean_low.zip(of.mean_high);
+    or_dash(ends, |(low, high)| format!("{} to {}", significant(low), significant(high)))
+}
+
+/// A row of the differences, also for the terminal.
+pub(super) fn difference_cells(
+    Difference { measure, from, to, statistic, effect }: &Difference,
+) -> [String; 8] {
+    [
+        measure.group.clone(),
+        format!("{}, {}", measure.of.about, measure.of.unit),
+        format!("{from} to {to}"),
+        or_dash(statistic.mean, significant),
+        interval(statistic),
+        or_dash(statistic.sd, significant),
+        or_dash(*effect, |g| format!("{g:.2}")),
+        statistic.count.to_string(),
+    ]
 }
 
 /// Two charts for each kind and side of cycles.
