@@ -16,6 +16,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parents[2]
@@ -171,7 +172,9 @@ def check_tutorials(installed: Installed, with_projects: bool) -> None:
     for document in documents:
         for link in re.findall(r"\]\(([^)#:]+)", document.read_text()):
             assert (document.parent / link).exists(), f"{document}: {link} is not in the folder"
-    counts = {document.stem: follow(installed, document) for document in documents}
+    # Two at a time: each document has a folder of its own.
+    with ThreadPoolExecutor(2) as pool:
+        counts = dict(zip(documents, pool.map(lambda document: follow(installed, document), documents), strict=True))
     assert all(counts.values()) and len(counts) >= 6, counts
     print(f"tutorials: {sum(counts.values())} commands of {len(counts)} pages show what they say without the source")
 
