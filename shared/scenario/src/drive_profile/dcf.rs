@@ -91,11 +91,13 @@ impl DcfRead {
             let absent = ObjectConfig { rule: ObjectRule::Absent, ..Default::default() };
             objects.entry(ObjectKey(address)).or_insert(absent);
         }
-        let undescribed = dcf.undescribed.iter().map(|index| ObjectKey(ObjectAddress::new(*index, 0)));
-        let undescribed: Vec<_> = undescribed.collect();
-        if !undescribed.is_empty() {
-            let reason = "listed without a section; is the file cut short?";
-            self.not_taken.insert(reason.to_owned(), undescribed);
+        let beside = [
+            (&dcf.undescribed, "listed without a section; is the file cut short?"),
+            (&dcf.of_modules, "of a module"),
+        ];
+        for (indices, reason) in beside.into_iter().filter(|(indices, _)| !indices.is_empty()) {
+            let keys = indices.iter().map(|index| ObjectKey(ObjectAddress::new(*index, 0)));
+            self.not_taken.insert(reason.to_owned(), keys.collect());
         }
         for entry in dcf.entries() {
             let key = ObjectKey(entry.address);
@@ -311,6 +313,7 @@ mod tests {
             ("6066", "DataType=6 ParameterValue=5"),
             ("6067", "DataType=7 HighLimit=5"),
             ("607C", "DataType=4 ParameterValue=5000"),
+            ("M1Fixed6423", "DataType=1 ParameterValue=1"),
         ];
         let own =
             "1012h = { value = 128 }\n6065h = { value = 7 }\n6066h = { value = 5 }\n6067h = { value = 3 }";
@@ -319,7 +322,7 @@ mod tests {
         let own = ["1015h", "1C00h", "6065h", "6066h", "1018h:01", "2014h"].map(taken);
         assert_eq!(own, [Some(5), Some(1), Some(7), Some(5), None, None]);
         for named in [
-            "not taken from the file x.dcf: 22 objects: ",
+            "not taken from the file x.dcf: 23 objects: ",
             "1010h:01, 6040h (a command)",
             "2021h (write-only",
             "607Ch (drive_profile.homing decides)",
@@ -335,6 +338,7 @@ mod tests {
             "2019h (OCTET_STRING)",
             "201Ah ($NODEID in no object of the communication)",
             "201Ch (data type 8000h)",
+            "6423h (of a module)",
             "1012h, 6065h, 6067h (the profile names the object)",
         ] {
             assert!(warning.contains(named), "{named}: {warning}");

@@ -36,6 +36,8 @@ pub struct Dcf {
     pub commissioning: Commissioning,
     /// Objects in the lists of the file without a section: the file is cut short, or its lists are wrong.
     pub undescribed: Vec<u16>,
+    /// Objects that modules of a modular device add, by sections such as `[M1SubExt6200]`: they are not among the entries.
+    pub of_modules: Vec<u16>,
     entries: BTreeMap<ObjectAddress, Entry>,
 }
 
@@ -92,6 +94,8 @@ impl Dcf {
                     return Err(section.refused(format!("{of} of its object; add it")));
                 }
                 dcf.add(Entry::read(section, ObjectAddress::new(index, subindex))?);
+            } else if let Some(index) = of_module(section.name) {
+                dcf.of_modules.push(index);
             } else if !is_beside_entries(section.name)
                 && OF_ENTRY.iter().any(|key| section.get(key).is_some())
             {
@@ -99,6 +103,8 @@ impl Dcf {
                 return Err(section.refused(format!("[{}] is the name of no entry; {need}", section.name)));
             }
         }
+        dcf.of_modules.sort_unstable();
+        dcf.of_modules.dedup();
         Ok(dcf)
     }
 
@@ -194,6 +200,13 @@ fn sub_index(name: &str) -> Option<(u16, u8)> {
     let name = name.to_ascii_lowercase();
     let (object, subindex) = name.split_once("sub")?;
     Some((index(object)?, u8::try_from(hexadecimal(subindex)?).ok()?))
+}
+
+/// The index in the name of a section by which a module extends or adds an object.
+fn of_module(name: &str) -> Option<u16> {
+    let name = name.to_ascii_lowercase();
+    let rest = name.strip_prefix('m')?.trim_start_matches(|digit: char| digit.is_ascii_digit());
+    index(rest.strip_prefix("subext").or(rest.strip_prefix("fixed"))?.get(..4)?)
 }
 
 fn hexadecimal(digits: &str) -> Option<u16> {

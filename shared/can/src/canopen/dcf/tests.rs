@@ -124,11 +124,17 @@ fn a_configuration_takes_the_place_of_the_value_as_delivered() {
 }
 
 #[test]
+fn objects_of_modules_are_told_and_are_no_entries() {
+    let sections = ["M1Comments", "M1SubExt6200", "M12Fixed6423", "M12Fixed6423sub1", "M1SubExt6200Name"];
+    let text = sections.map(|name| format!("[{name}]\n{HEAD}DataType=7\n")).concat();
+    let dcf = Dcf::parse(&text).unwrap();
+    assert_eq!((dcf.of_modules, dcf.undescribed, dcf.entries.len()), (vec![0x6200, 0x6423], vec![], 0));
+}
+
+#[test]
 fn objects_that_a_list_names_without_a_section_are_told() {
     let lists = "[MandatoryObjects]\nSupportedObjects=1\n1=0x1000\n[OptionalObjects]\nSupportedObjects=2\n1=0x2000\n2=0x2001\n";
     let dcf = Dcf::parse(&format!("{lists}[2000]\n{HEAD}DataType=7")).unwrap();
     assert_eq!(dcf.undescribed, [0x1000, 0x2001]);
-    let module = Dcf::parse(&format!("[M1SubExt6200]\n{HEAD}DataType=7")).unwrap();
-    assert_eq!((module.undescribed, module.entries.len()), (vec![], 0));
     assert!(Dcf::parse("[OptionalObjects]\n1=all").is_err());
 }
