@@ -127,14 +127,17 @@ def refused(node):
 
 
 def blocks(node):
-    """SDO block transfer with CRC: a text, a number, and more than one block of 127 segments each way."""
+    """SDO block transfer with CRC: a text, a number, and more than one block of segments each way."""
     with node.sdo.open(0x1008, 0, "rb", block_transfer=True) as name:
-        check("a text by block transfer", name.read() == node.sdo[0x1008].raw.encode())
+        text = name.read()
+    # The transfer ends with the block: no other one may begin within.
+    check("a text by block transfer", text == node.sdo[0x1008].raw.encode())
     data = bytes(place * 37 % 251 for place in range(1024))
     with node.sdo.open(0x2010, 0, "wb", size=len(data), block_transfer=True) as user_data:
         user_data.write(data)
     with node.sdo.open(0x2010, 0, "rb", block_transfer=True) as user_data:
-        check("1024 bytes come back by block transfer", user_data.read() == data)
+        back = user_data.read()
+    check("1024 bytes come back by block transfer", back == data)
     check("and in segments", node.sdo.upload(0x2010, 0) == data)
     with node.sdo.open(0x6081, 0, "wb", size=4, block_transfer=True) as velocity:
         velocity.write(struct.pack("<I", 50_000))

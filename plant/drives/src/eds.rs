@@ -160,6 +160,109 @@ mod tests {
         }
     }
 
+    /// Sections with their keys, in the order of the sheet.
+    fn sections(sheet: &str) -> Vec<(&str, Vec<(&str, &str)>)> {
+        let mut sections = Vec::new();
+        for line in sheet.lines().filter(|line| !line.is_empty()) {
+            if let Some(name) = line.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')) {
+                sections.push((name, Vec::new()));
+            } else {
+                let (_, keys) = sections.last_mut().expect("a section before the first key");
+                keys.push(line.split_once('=').expect("key=value"));
+            }
+        }
+        sections
+    }
+
+    /// CiA 306-1 without a parser of sheets: the sections and keys that it demands, lists that count and name each object
+    /// once in the list of its range, and descriptions with the keys of their object type.
+    #[test]
+    fn a_sheet_keeps_to_the_rules_of_cia_306() {
+        let with = |quirk: Quirk| DriveSettings { quirks: vec![quirk], ..settings() };
+        for settings in [settings(), with(Quirk::MissingObjects), with(Quirk::FactoryPdos)] {
+            let sheet = eds(&settings).unwrap();
+            assert!(sheet.is_ascii() && sheet.lines().all(|line| line.len() <= 255));
+            let sections = sections(&sheet);
+            let keys = |name: &str| &sections.iter().find(|(other, _)| *other == name).expect(name).1;
+            let value = |name: &str, key: &str| {
+                let values: Vec<_> = keys(name).iter().filter(|(other, _)| *other == key).collect();
+                assert_eq!(values.len(), 1, "[{name}] {key}");
+                values[0].1
+            };
+            let number = |text: &str| match text.strip_prefix("0x") {
+                Some(digits) => i64::from_str_radix(digits, 16).unwrap(),
+                None => text.parse().unwrap(),
+            };
+            let head = [
+                ("FileInfo", "FileName FileVersion FileRevision EDSVersion Description CreatedBy"),
+                ("DeviceInfo", "VendorName VendorNumber ProductName ProductNumber RevisionNumber OrderCode"),
+                ("DeviceInfo", "BaudRate_10 BaudRate_20 BaudRate_50 BaudRate_125 BaudRate_250 BaudRate_500"),
+                ("DeviceInfo", "BaudRate_800 BaudRate_1000 SimpleBootUpMaster SimpleBootUpSlave Granularity"),
+                ("DeviceInfo", "DynamicChannelsSupported GroupMessaging NrOfRXPDO NrOfTXPDO LSS_Supported"),
+                ("DummyUsage", "Dummy0001 Dummy0002 Dummy0003 Dummy0004 Dummy0005 Dummy0006 Dummy0007"),
+                ("Comments", "Lines"),
+            ];
+            for (section, names) in head {
+                names.split(' ').for_each(|name| assert!(!value(section, name).is_empty(), "{name}"));
+            }
+            assert!(value("FileInfo", "FileName").ends_with(".eds"));
+
+            let mut listed = Vec::new();
+            for (list, holds) in [
+                ("MandatoryObjects", (|index| MANDATORY.contains(&index)) as fn(u16) -> bool),
+                ("OptionalObjects", |index| {
+                    !(0x2000..0x6000).contains(&index) && !MANDATORY.contains(&index)
+                }),
+                ("ManufacturerObjects", |index| (0x2000..0x6000).contains(&index)),
+            ] {
+                let count = number(value(list, "SupportedObjects"));
+                assert_eq!(keys(list).len() as i64, count + 1, "{list}");
+                for place in 1..=count {
+                    let index = number(value(list, &place.to_string())) as u16;
+                    assert!(holds(index), "{index:04X} in {list}");
+                    listed.push(format!("{index:04X}"));
+                }
+            }
+            let is_object = |name: &str| name.len() == 4 && u16::from_str_radix(name, 16).is_ok();
+            let mut described: Vec<_> =
+                sections.iter().map(|(name, _)| (*name).to_owned()).filter(|name| is_object(name)).collect();
+            (listed.sort(), described.sort());
+            assert_eq!(listed, described, "every object in one list, and with a section");
+            let pdos = |first: char| {
+                let index = if first == 'R' { "140" } else { "180" };
+                (described.iter().filter(|name| name.starts_with(index)).count(), format!("NrOf{first}XPDO"))
+            };
+            for (count, key) in [pdos('R'), pdos('T')] {
+                assert_eq!(number(value("DeviceInfo", &key)), count as i64);
+            }
+
+            for name in &described {
+                let subs = sections.iter().filter(|(other, _)| other.starts_with(&format!("{name}sub")));
+                let subs: Vec<_> = subs.map(|(other, _)| *other).collect();
+                match value(name, "ObjectType") {
+                    "0x8" | "0x9" => {
+                        assert_eq!(number(value(name, "SubNumber")), subs.len() as i64, "{name}");
+                        assert_eq!(value(&format!("{name}sub0"), "DataType"), "0x0005");
+                    }
+                    _ => assert!(subs.is_empty(), "{name}"),
+                }
+                for entry in if subs.is_empty() { vec![name.as_str()] } else { subs } {
+                    let text = value(entry, "ParameterName");
+                    assert!((1..=241).contains(&text.len()), "{entry}");
+                    let kind = number(value(entry, "DataType"));
+                    let shape = if kind == DataType::Domain as i64 { "0x2" } else { "0x7" };
+                    assert_eq!(value(entry, "ObjectType"), shape, "{entry}");
+                    assert!(["const", "ro", "rw"].contains(&value(entry, "AccessType")), "{entry}");
+                    assert!(["0", "1"].contains(&value(entry, "PDOMapping")), "{entry}");
+                    if keys(entry).iter().any(|(key, _)| *key == "LowLimit") {
+                        let limits = number(value(entry, "LowLimit"))..=number(value(entry, "HighLimit"));
+                        assert!(limits.contains(&number(value(entry, "DefaultValue"))), "{entry}");
+                    }
+                }
+            }
+        }
+    }
+
     #[test]
     fn a_sheet_lists_what_the_drive_lets_clients_read() {
         let plain = eds(&settings()).unwrap();

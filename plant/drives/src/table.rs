@@ -22,8 +22,8 @@ pub(crate) const HISTORY: usize = 8;
 pub(crate) const CONSUMED: usize = 2;
 /// Bytes that the user data hold: more than a block of SDO.
 pub(crate) const USER_DATA_MAX: usize = 1024;
-/// 6502h: profile position, homing, cyclic synchronous position and torque.
-const SUPPORTED_MODES: i64 = 1 << 0 | 1 << 5 | 1 << 7 | 1 << 9;
+/// 6502h: profile position, velocity and torque, homing, cyclic synchronous position, velocity and torque.
+const SUPPORTED_MODES: i64 = 1 << 0 | 1 << 2 | 1 << 3 | 1 << 5 | 1 << 7 | 1 << 8 | 1 << 9;
 
 /// Increments of a turn of the motor.
 pub const INCREMENTS_PER_TURN: u32 = 10_000;
@@ -213,7 +213,10 @@ pub(crate) static OBJECTS: &[Object] = &[
     var(&[plain(0x6065, "Following error window", U32, ReadWrite, Configured)]),
     var(&[plain(0x6066, "Following error time out", U16, ReadWrite, Configured)]),
     var(&[plain(0x6067, "Position window", U32, ReadWrite, Configured)]),
+    var(&[plain(0x606B, "Velocity demand value", I32, ReadOnly, Value(0)).mapped(Tpdo)]),
     var(&[plain(0x606C, "Velocity actual value", I32, ReadOnly, Value(0)).mapped(Tpdo)]),
+    var(&[plain(0x606D, "Velocity window", U16, ReadWrite, Configured)]),
+    var(&[plain(0x606F, "Velocity threshold", U16, ReadWrite, Configured)]),
     var(&[plain(0x6071, "Target torque", I16, ReadWrite, Value(0)).mapped(Any)]),
     var(&[plain(0x6072, "Max torque", U16, ReadWrite, Configured)]),
     // In process data that answer a SYNC, the mean since the last SYNC, so that samples miss no work of a cycle.
@@ -231,6 +234,7 @@ pub(crate) static OBJECTS: &[Object] = &[
     var(&[positive((0x6083, 0), "Profile acceleration").mapped(Any)]),
     var(&[positive((0x6084, 0), "Profile deceleration").mapped(Any)]),
     var(&[positive((0x6085, 0), "Quick stop deceleration")]),
+    var(&[plain(0x6087, "Torque slope", U32, ReadWrite, Value(10_000)).within(1, u32::MAX as i64).mapped(Any)]),
     object("Position encoder resolution", Array, &ratio(0x608F, ["Encoder increments", "Motor revolutions"], [INCREMENTS_PER_TURN, 1])),
     object("Gear ratio", Array, &ratio(0x6091, ["Motor revolutions", "Shaft revolutions"], [1, 1])),
     object("Feed constant", Array, &ratio(0x6092, ["Feed", "Shaft revolutions"], [INCREMENTS_PER_TURN, 1])),
@@ -254,6 +258,7 @@ pub(crate) static OBJECTS: &[Object] = &[
     ]),
     var(&[plain(0x60F4, "Following error actual value", I32, ReadOnly, Value(0)).mapped(Tpdo)]),
     var(&[plain(0x60FD, "Digital inputs", U32, ReadOnly, Value(0)).mapped(Tpdo)]),
+    var(&[plain(0x60FF, "Target velocity", I32, ReadWrite, Value(0)).mapped(Any)]),
     var(&[plain(0x6502, "Supported drive modes", U32, Constant, Value(SUPPORTED_MODES))]),
 ];
 

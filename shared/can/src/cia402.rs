@@ -150,6 +150,8 @@ pub enum StatusBit {
 impl StatusBit {
     /// Profile position: the drive has the new set-point.
     pub const SETPOINT_ACKNOWLEDGED: Self = Self::TargetFollowed;
+    /// Profile velocity: the axis stands.
+    pub const SPEED_ZERO: Self = Self::TargetFollowed;
     /// Homing: the drive has found the home position.
     pub const HOMING_ATTAINED: Self = Self::TargetFollowed;
     /// Homing: the search has failed.

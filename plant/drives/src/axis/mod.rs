@@ -23,7 +23,9 @@ use crate::settings::DriveSettings;
 use drivetrain::Drivetrain;
 use encoder::{Coordinates, Look, Switches};
 use modes::{Homing, Positioning, Sensed};
-use motion::{Demand, Mode, Motion, MotionCommand, NewTargets, PositionView, Profile, ServoCommand, clamp};
+use motion::{
+    Demand, Mode, Motion, MotionCommand, NewTargets, PositionView, Profile, Ramp, ServoCommand, clamp,
+};
 use parameters::{Offsets, Parameters};
 use power::PowerStage;
 use servo::{FollowingErrorMonitor, ServoLimits};
@@ -102,7 +104,8 @@ impl Axis {
         self.configure(now_ns, objects);
     }
 
-    /// Applies the dictionary's configuration. A mode that changes in operation brings the axis to rest first.
+    /// Applies the dictionary's configuration. A mode that changes in operation brings the axis to rest, unless the mode
+    /// has a target already.
     pub(super) fn configure(&mut self, now_ns: u64, objects: &Objects) {
         self.parameters = Parameters::from_objects(objects, &self.config, &self.quirks);
         let mode = Mode::supported(objects.get(names::MODE), objects).unwrap_or(self.mode);
@@ -129,7 +132,10 @@ impl Axis {
                     let (counts, limits) = (self.coordinates.counts, self.switches.limits);
                     self.homing.control(words, method, counts, limits, view)
                 }
-                Mode::CyclicPosition | Mode::CyclicTorque => None,
+                Mode::ProfileVelocity | Mode::ProfileTorque => {
+                    (word.halts() && !before.halts()).then_some(MotionCommand::SlowDown)
+                }
+                Mode::CyclicPosition | Mode::CyclicVelocity | Mode::CyclicTorque => None,
             };
             self.execute(command, now_ns);
         }
@@ -191,9 +197,60 @@ impl Axis {
                 let target = objects.get(names::TARGET_POSITION);
                 self.follow_target(now_ns, target.saturating_add(self.offsets.position));
             }
-            Mode::CyclicTorque if new.torque => self.apply_torque(objects.get(names::TARGET_TORQUE)),
+            Mode::CyclicVelocity if new.velocity => {
+                let (target_m_s, start_m_s) = (self.target_m_s(objects), self.speed_m_s(now_ns));
+                let rate_per_s = (target_m_s - start_m_s).abs() / self.parameters.period_s;
+                self.demand =
+                    Demand::Speed(Ramp { from_ns: now_ns, start: start_m_s, target: target_m_s, rate_per_s });
+            }
+            Mode::CyclicTorque if new.torque => {
+                self.demand = Demand::Force(Ramp::at_once(self.target_n(objects)));
+            }
             _ => {}
         }
+    }
+
+    /// Takes the target of profile velocity or torque, which counts as long as the drive is enabled and not halted. A
+    /// target that runs already goes on.
+    pub(super) fn retarget(&mut self, now_ns: u64, objects: &Objects) {
+        let is_profile = matches!(self.mode, Mode::ProfileVelocity | Mode::ProfileTorque);
+        if !is_profile || !self.power.is_operated() || self.controlword.halts() {
+            return;
+        }
+        if self.ignores(NewTargets { velocity: true, torque: true, ..NewTargets::default() }) {
+            return;
+        }
+        // Nothing moves while the brake opens.
+        let from_ns = self.drivetrain.brake.free_from_ns(now_ns);
+        let Parameters { torque_slope_n_s, profile, .. } = self.parameters;
+        if self.mode == Mode::ProfileTorque {
+            let (target, start) = (self.target_n(objects), self.drivetrain.motor_n.value);
+            if !matches!(self.demand, Demand::Force(ramp) if ramp.target.to_bits() == target.to_bits()) {
+                self.demand = Demand::Force(Ramp { from_ns, start, target, rate_per_s: torque_slope_n_s });
+            }
+            return;
+        }
+        let (target, start) = (self.target_m_s(objects), self.speed_m_s(now_ns));
+        if !matches!(self.demand, Demand::Speed(ramp) if ramp.target.to_bits() == target.to_bits()) {
+            let speeds_up = target.abs() > start.abs();
+            let rate_per_s = if speeds_up { profile.acceleration_m_s2 } else { profile.deceleration_m_s2 };
+            self.demand = Demand::Speed(Ramp { from_ns, start, target, rate_per_s });
+        }
+    }
+
+    /// The demanded velocity where there is one, else the actual one, m/s.
+    fn speed_m_s(&self, now_ns: u64) -> f64 {
+        let Demand::Speed(ramp) = self.demand else { return self.drivetrain.servo.motion.velocity_m_s };
+        ramp.at(now_ns)
+    }
+
+    /// The target velocity (60FFh) within its limit, m/s.
+    fn target_m_s(&mut self, objects: &Objects) -> f64 {
+        let target = f64::from(objects.get(names::TARGET_VELOCITY)) * self.config.encoder_resolution_m;
+        let limit_m_s = self.parameters.velocity_limit_m_s;
+        let (target_m_s, is_limited) = clamp(target + self.offsets.velocity_m_s, [-limit_m_s, limit_m_s]);
+        self.is_target_limited = is_limited;
+        target_m_s
     }
 
     /// Whether an injected fault makes the drive ignore its targets.
@@ -214,12 +271,14 @@ impl Axis {
         self.is_target_limited = is_too_fast || allowed != target;
     }
 
-    fn apply_torque(&mut self, torque_permille: i16) {
+    /// The target torque (6071h) within its limit, N.
+    fn target_n(&mut self, objects: &Objects) -> f64 {
+        let torque_permille = objects.get(names::TARGET_TORQUE);
         let target_n = f64::from(torque_permille) / 1000.0 * self.config.rated_force_n + self.offsets.force_n;
         let limit_n = self.parameters.force_limit_n;
         let (force_n, is_limited) = clamp(target_n, [-limit_n, limit_n]);
         self.is_target_limited = is_limited;
-        self.demand = Demand::Force { force_n };
+        force_n
     }
 
     /// A step of the servo loops with the shaft at a position. Returns the force until the next step, N, and whether
@@ -245,7 +304,7 @@ impl Axis {
                     let sensed = self.sensed(counts, is_at_rest());
                     self.homing.step(&sensed)
                 }
-                Mode::CyclicPosition | Mode::CyclicTorque => None,
+                _ => None,
             };
             self.execute(command, now_ns);
         }
@@ -293,12 +352,17 @@ impl Axis {
     /// Writes the state of the axis into the objects that show it.
     pub(super) fn show(&self, now_ns: u64, objects: &mut Objects) {
         let actual = self.coordinates.actual();
-        let demand_m = self.demand.position_m(now_ns);
-        let demand = demand_m.map_or(actual, |demand_m| self.coordinates.increments(demand_m));
+        let motion = self.demand.at(now_ns);
+        let demand = motion.map_or(actual, |motion| self.coordinates.increments(motion.position_m));
+        let speed_m_s = match &self.demand {
+            Demand::Speed(ramp) => ramp.at(now_ns),
+            _ => motion.map_or(0.0, |motion| motion.velocity_m_s),
+        };
         let torque = self.shown_n / self.config.rated_force_n * 1000.0;
         objects.set(names::STATUSWORD, self.statusword(now_ns).0);
         objects.set(names::MODE_DISPLAY, self.mode.number());
         objects.set(names::POSITION_DEMAND, demand);
+        objects.set(names::VELOCITY_DEMAND, self.coordinates.nearest(speed_m_s));
         objects.set(names::ENCODER_COUNTS, self.coordinates.shown_counts());
         objects.set(names::POSITION_ACTUAL, actual);
         objects
@@ -321,7 +385,13 @@ impl Axis {
             Mode::CyclicPosition => word
                 .with(StatusBit::TargetFollowed, is_free)
                 .with(StatusBit::FollowingError, self.following.is_fault),
-            Mode::CyclicTorque => word.with(StatusBit::TargetFollowed, is_free),
+            Mode::CyclicVelocity | Mode::CyclicTorque => word.with(StatusBit::TargetFollowed, is_free),
+            Mode::ProfileVelocity => word
+                .with(StatusBit::TargetReached, is_enabled && self.has_reached_value(now_ns))
+                .with(StatusBit::SPEED_ZERO, self.stands()),
+            Mode::ProfileTorque => {
+                word.with(StatusBit::TargetReached, is_enabled && self.has_reached_value(now_ns))
+            }
             Mode::ProfilePosition => word
                 .with(StatusBit::TargetReached, is_enabled && self.has_reached_setpoint(now_ns))
                 .with(StatusBit::SETPOINT_ACKNOWLEDGED, is_enabled && self.positioning.is_acknowledged)
@@ -337,6 +407,23 @@ impl Axis {
         }
         let demand_m = self.demand.position_m(now_ns).unwrap_or(self.measured_m());
         self.controlword.halts() || (demand_m - self.measured_m()).abs() <= self.parameters.position_window_m
+    }
+
+    /// Statusword bit 10 of profile velocity and torque: the target is there, or the axis is halted.
+    fn has_reached_value(&self, now_ns: u64) -> bool {
+        match &self.demand {
+            Demand::Speed(ramp) => {
+                let error_m_s = ramp.target - self.drivetrain.servo.motion.velocity_m_s;
+                error_m_s.abs() <= self.parameters.velocity_window_m_s
+            }
+            Demand::Force(ramp) => ramp.at(now_ns).to_bits() == ramp.target.to_bits(),
+            demand => self.controlword.halts() && demand.is_at_rest(now_ns),
+        }
+    }
+
+    /// Whether the axis is slower than the velocity threshold (606Fh).
+    fn stands(&self) -> bool {
+        self.drivetrain.servo.motion.velocity_m_s.abs() <= self.parameters.velocity_threshold_m_s
     }
 
     fn enter(&mut self, state: DriveState, now_ns: u64) {
@@ -362,7 +449,8 @@ impl Axis {
     /// The cyclic modes wait for their first target behind a closed brake; the other modes hold the position.
     fn enable(&mut self, now_ns: u64) {
         self.drivetrain.brake.open(now_ns);
-        if matches!(self.mode, Mode::ProfilePosition | Mode::Homing) {
+        let waits = matches!(self.mode, Mode::CyclicPosition | Mode::CyclicVelocity | Mode::CyclicTorque);
+        if !waits {
             let here = Motion::at_rest(self.measured_m());
             self.demand =
                 Demand::Profile(Profile::stop(now_ns, here, self.parameters.profile.deceleration_m_s2));
@@ -389,7 +477,7 @@ impl Axis {
         let Some(window_m) = self.parameters.following_window_m else { return false };
         let error_m = match command {
             ServoCommand::Follow(demanded) => demanded.position_m - self.measured_m(),
-            ServoCommand::Brake | ServoCommand::Force { .. } => 0.0,
+            ServoCommand::Brake | ServoCommand::Speed { .. } | ServoCommand::Force { .. } => 0.0,
         };
         if !self.following.exceeds(now_ns, error_m, window_m, self.parameters.following_timeout_ns) {
             return false;
@@ -461,13 +549,14 @@ impl Axis {
 
     fn servo_limits(&self, command: ServoCommand) -> ServoLimits {
         let Parameters { velocity_limit_m_s, force_limit_n, .. } = self.parameters;
-        let is_force = matches!(command, ServoCommand::Force { .. });
-        let free_velocity_m_s = if is_force { self.free_velocity_m_s() } else { [0.0; 2] };
-        let feed_n = if self.mode == Mode::CyclicPosition { self.offsets.force_n } else { 0.0 };
+        let is_free = matches!(command, ServoCommand::Speed { .. } | ServoCommand::Force { .. });
+        let free_velocity_m_s = if is_free { self.free_velocity_m_s() } else { [0.0; 2] };
+        let is_fed = matches!(self.mode, Mode::CyclicPosition | Mode::CyclicVelocity);
+        let feed_n = if is_fed { self.offsets.force_n } else { 0.0 };
         ServoLimits { force_n: force_limit_n, velocity_m_s: velocity_limit_m_s, free_velocity_m_s, feed_n }
     }
 
-    /// Speed limit in force control: the axis can stop before the software position limits, at the profile deceleration
+    /// Speed limit in velocity and force control: the axis can stop before the software position limits, at the profile deceleration
     /// (6084h).
     fn free_velocity_m_s(&self) -> [f64; 2] {
         let Parameters { velocity_limit_m_s, profile, .. } = self.parameters;

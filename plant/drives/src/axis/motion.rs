@@ -33,16 +33,21 @@ pub(super) fn clamp(asked: f64, [low, high]: [f64; 2]) -> (f64, bool) {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) enum Mode {
     ProfilePosition = 1,
+    ProfileVelocity = 3,
+    ProfileTorque = 4,
     Homing = 6,
     CyclicPosition = 8,
+    CyclicVelocity = 9,
     CyclicTorque = 10,
 }
 
 impl Mode {
     /// The mode of that number; `None` for an unknown mode.
     pub(crate) fn from_number(number: i8) -> Option<Self> {
-        let modes = [Self::ProfilePosition, Self::Homing, Self::CyclicPosition, Self::CyclicTorque];
-        modes.into_iter().find(|mode| mode.number() == number)
+        let profiles = [Self::ProfilePosition, Self::ProfileVelocity, Self::ProfileTorque, Self::Homing];
+        let cyclic = [Self::CyclicPosition, Self::CyclicVelocity, Self::CyclicTorque];
+        let mut modes = profiles.into_iter().chain(cyclic);
+        modes.find(|mode| mode.number() == number)
     }
 
     /// The mode of that number; `None` where the dictionary (6502h) does not support it.
@@ -57,13 +62,15 @@ impl Mode {
     }
 }
 
-/// The cyclic targets that are new at a SYNC.
+/// Targets that are new; those of the cyclic modes wait for SYNC.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct NewTargets {
     /// Target position (607Ah).
     pub(crate) position: bool,
     /// Target torque (6071h).
     pub(crate) torque: bool,
+    /// Target velocity (60FFh).
+    pub(crate) velocity: bool,
 }
 
 /// Positions of an axis as a mode of operation sees them, increments of the dictionary.
@@ -193,11 +200,40 @@ pub(super) enum ServoCommand {
     Brake,
     /// Follow a position with its velocity.
     Follow(Motion),
+    /// Keep a velocity within its range, wherever the axis is.
+    Speed {
+        /// Desired velocity, m/s.
+        velocity_m_s: f64,
+    },
     /// Apply a force while the velocity is within its range.
     Force {
         /// Desired force, N.
         force_n: f64,
     },
+}
+
+/// A value that changes evenly up to a target, and stays there.
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+pub(super) struct Ramp {
+    pub(super) from_ns: u64,
+    pub(super) start: f64,
+    pub(super) target: f64,
+    /// Size of the change in a second.
+    pub(super) rate_per_s: f64,
+}
+
+impl Ramp {
+    /// The target at once.
+    pub(super) const fn at_once(target: f64) -> Self {
+        Self { from_ns: 0, start: target, target, rate_per_s: 0.0 }
+    }
+
+    /// The value at that time.
+    pub(super) fn at(&self, now_ns: u64) -> f64 {
+        let way = self.target - self.start;
+        let moved = now_ns.saturating_sub(self.from_ns) as f64 * 1e-9 * self.rate_per_s;
+        if moved >= way.abs() { self.target } else { self.start + moved.copysign(way) }
+    }
 }
 
 /// The demand of an axis.
@@ -209,15 +245,17 @@ pub(super) enum Demand {
     Interpolate { from_m: f64, to_m: f64, from_ns: u64, period_s: f64 },
     /// A ramp or a whole positioning.
     Profile(Profile),
-    /// A force.
-    Force { force_n: f64 },
+    /// A velocity, m/s.
+    Speed(Ramp),
+    /// A force, N.
+    Force(Ramp),
 }
 
 impl Demand {
-    /// The demanded motion; none while the brake is closed or a force is demanded.
+    /// The demanded motion; none while the brake is closed, and for a velocity or a force.
     pub(super) fn at(&self, now_ns: u64) -> Option<Motion> {
         match self {
-            Self::Brake | Self::Force { .. } => None,
+            Self::Brake | Self::Speed(_) | Self::Force(_) => None,
             Self::Interpolate { from_m, to_m, from_ns, period_s } => {
                 let share = now_ns.saturating_sub(*from_ns) as f64 * 1e-9 / period_s;
                 let way_m = to_m - from_m;
@@ -231,7 +269,8 @@ impl Demand {
     /// The servo's command at that time.
     pub(super) fn servo_command(&self, now_ns: u64) -> ServoCommand {
         match (self, self.at(now_ns)) {
-            (Self::Force { force_n }, _) => ServoCommand::Force { force_n: *force_n },
+            (Self::Speed(ramp), _) => ServoCommand::Speed { velocity_m_s: ramp.at(now_ns) },
+            (Self::Force(ramp), _) => ServoCommand::Force { force_n: ramp.at(now_ns) },
             (_, Some(motion)) => ServoCommand::Follow(motion),
             (_, None) => ServoCommand::Brake,
         }
@@ -253,7 +292,7 @@ impl Demand {
         limit_m_s: f64,
     ) -> bool {
         let from_m = match self {
-            Self::Brake | Self::Force { .. } => actual_m,
+            Self::Brake | Self::Speed(_) | Self::Force(_) => actual_m,
             Self::Interpolate { to_m, .. } => *to_m,
             Self::Profile(profile) => profile.at(now_ns).position_m,
         };
@@ -263,7 +302,7 @@ impl Demand {
         is_limited
     }
 
-    /// Slows down from the demanded position (the actual position under a force) and the actual velocity. The demanded
+    /// Slows down from the demanded position (the actual position where none is demanded) and the actual velocity. The demanded
     /// velocity is no guide: at SYNC, the time of the command, it is zero at the end of a line. A closed brake stays
     /// closed.
     pub(super) fn slow_down(&mut self, now_ns: u64, actual: Motion, deceleration_m_s2: f64) {
@@ -278,7 +317,7 @@ impl Demand {
     pub(super) fn is_at_rest(&self, now_ns: u64) -> bool {
         match self {
             Self::Brake => true,
-            Self::Force { .. } => false,
+            Self::Speed(_) | Self::Force(_) => false,
             Self::Profile(profile) => profile.is_over(now_ns),
             Self::Interpolate { .. } => self.at(now_ns).is_none_or(|motion| motion.velocity_m_s.abs() < 1e-9),
         }
@@ -307,7 +346,7 @@ mod motion_tests {
     fn a_mode_has_the_number_of_cia_402() {
         let numbers: Vec<_> =
             (i8::MIN..=i8::MAX).filter(|&number| Mode::from_number(number).is_some()).collect();
-        assert_eq!(numbers, [1, 6, 8, 10]);
+        assert_eq!(numbers, [1, 3, 4, 6, 8, 9, 10]);
         for number in numbers {
             assert_eq!(Mode::from_number(number).map(Mode::number), Some(number));
         }
@@ -446,8 +485,18 @@ mod demand_tests {
     }
 
     #[test]
+    fn a_ramp_changes_evenly_and_ends_at_its_target() {
+        for [start, target, half] in [[0.1, 0.3, 0.2], [0.3, -0.1, 0.2]] {
+            let ramp = Ramp { from_ns: MS, start, target, rate_per_s: 10.0 };
+            assert_eq!([0, MS, 50 * MS].map(|now_ns| ramp.at(now_ns)), [start, start, target]);
+            assert!((ramp.at(11 * MS) - half).abs() < 1e-12);
+        }
+        assert_eq!(Ramp::at_once(7.0).at(0), 7.0);
+    }
+
+    #[test]
     fn from_a_force_it_slows_down_where_the_axis_is() {
-        let mut demand = Demand::Force { force_n: 20.0 };
+        let mut demand = Demand::Force(Ramp::at_once(20.0));
         assert_eq!(demand.servo_command(0), ServoCommand::Force { force_n: 20.0 });
         demand.slow_down(0, Motion { position_m: 0.28, velocity_m_s: 0.1 }, 10.0);
         assert!((demand.position_m(100 * MS).unwrap() - 0.2805).abs() < 1e-9);
@@ -470,7 +519,7 @@ mod demand_tests {
         assert!(demand.interpolate(7 * MS, 0.5, 0.26, 2e-3, 0.4), "backwards, too far");
         let end = demand.at(9 * MS).unwrap();
         assert!((end.position_m - 0.2696).abs() < 1e-12, "{end:?}");
-        assert!(!Demand::Force { force_n: 1.0 }.is_at_rest(20 * MS));
+        assert!(!Demand::Force(Ramp::at_once(1.0)).is_at_rest(20 * MS));
         let mut demand = Demand::Brake;
         assert_eq!(demand.servo_command(20 * MS), ServoCommand::Brake);
         demand.slow_down(20 * MS, Motion { position_m: 0.27, velocity_m_s: 0.1 }, 10.0);

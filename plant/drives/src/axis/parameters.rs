@@ -74,7 +74,13 @@ pub(super) struct Parameters {
     pub(super) following_timeout_ns: u64,
     /// Position window of profile position (6067h), m.
     pub(super) position_window_m: f64,
-    /// Profile position (6081h, 6083h, 6084h).
+    /// Change of the target torque in profile torque (6087h), N/s.
+    pub(super) torque_slope_n_s: f64,
+    /// Error of the velocity at which profile velocity has reached its target (606Dh), m/s.
+    pub(super) velocity_window_m_s: f64,
+    /// Velocity up to which the axis stands (606Fh), m/s.
+    pub(super) velocity_threshold_m_s: f64,
+    /// Profile position and velocity (6081h, 6083h, 6084h).
     pub(super) profile: MotionLimits,
     /// Deceleration of a quick stop (605Ah, 6084h, 6085h), m/s²; `None` if the brake closes at once.
     pub(super) quick_stop_m_s2: Option<f64>,
@@ -142,6 +148,9 @@ impl Parameters {
             following_window_m: window.map(metres),
             following_timeout_ns: u64::from(objects.get(names::FOLLOWING_TIMEOUT_MS)) * MILLISECOND_NS,
             position_window_m: metres(objects.get(names::POSITION_WINDOW)),
+            torque_slope_n_s: f64::from(objects.get(names::TORQUE_SLOPE)) / 1000.0 * drive.rated_force_n,
+            velocity_window_m_s: metres(objects.get(names::VELOCITY_WINDOW).into()),
+            velocity_threshold_m_s: metres(objects.get(names::VELOCITY_THRESHOLD).into()),
             profile,
             quick_stop_m_s2: stop(objects.get(names::QUICK_STOP_OPTION)),
             holds_quick_stop: objects.get(names::QUICK_STOP_OPTION) >= 5,
@@ -174,6 +183,9 @@ pub(crate) fn configure(objects: &mut Objects, drive: &Ratings, period_ns: u64, 
     objects.set(names::MIN_POSITION_LIMIT, lowest);
     objects.set(names::MAX_POSITION_LIMIT, highest);
     objects.set(names::MAX_VELOCITY, velocity);
+    let small = (velocity / 50).clamp(1, u16::MAX.into()) as u16;
+    objects.set(names::VELOCITY_WINDOW, small);
+    objects.set(names::VELOCITY_THRESHOLD, small);
     // A quarter of the drive's abilities: profiles are for setting up.
     objects.set(names::PROFILE_VELOCITY, (velocity / 4).max(1));
     objects.set(names::PROFILE_ACCELERATION, (ramp / 4).max(1));

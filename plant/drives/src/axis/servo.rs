@@ -20,7 +20,7 @@ pub(super) struct ServoLimits {
     pub(super) force_n: f64,
     /// Largest velocity in position control, m/s.
     pub(super) velocity_m_s: f64,
-    /// Lowest and highest velocity in force control, m/s.
+    /// Lowest and highest velocity in velocity and force control, m/s.
     pub(super) free_velocity_m_s: [f64; 2],
     /// Force that position control gives beside its loops, N.
     pub(super) feed_n: f64,
@@ -78,6 +78,7 @@ impl Servo {
         match command {
             ServoCommand::Brake => self.brake(),
             ServoCommand::Follow(desired) => self.follow(desired, limits),
+            ServoCommand::Speed { velocity_m_s } => self.keep_speed(velocity_m_s, limits),
             ServoCommand::Force { force_n } => self.push(force_n, limits),
         }
     }
@@ -105,6 +106,21 @@ impl Servo {
             desired.velocity_m_s + config.position_gain_per_s * (desired.position_m - actual.position_m);
         let (speed_m_s, is_velocity_limited) =
             clamp(unlimited_m_s, [-limits.velocity_m_s, limits.velocity_m_s]);
+        self.regulate(speed_m_s, is_velocity_limited, limits)
+    }
+
+    /// Velocity control. The integral goes on at the limit of the velocity, so that a load moves nothing there.
+    fn keep_speed(&mut self, asked_m_s: f64, limits: &ServoLimits) -> f64 {
+        self.brake_at_m = None;
+        let (speed_m_s, is_velocity_limited) = clamp(asked_m_s, limits.free_velocity_m_s);
+        let force_n = self.regulate(speed_m_s, false, limits);
+        self.is_limited |= is_velocity_limited;
+        force_n
+    }
+
+    /// The velocity loop.
+    fn regulate(&mut self, speed_m_s: f64, is_velocity_limited: bool, limits: &ServoLimits) -> f64 {
+        let (config, actual) = (&self.config, self.motion);
         let proportional_n = config.velocity_gain_n_s_per_m * (speed_m_s - actual.velocity_m_s);
         let (force_n, is_force_limited) =
             clamp(proportional_n + self.integral_n + limits.feed_n, [-limits.force_n, limits.force_n]);

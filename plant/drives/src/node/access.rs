@@ -235,7 +235,7 @@ fn mappable(entry: MappingEntry, is_transmitted: bool, overlay: &Overlay) -> Res
 const _: () = assert!(MAPPED_MAX * 8 == PDO_BITS, "eight bytes hold eight objects at most");
 
 /// Objects that command something at once; they are no parameters.
-const COMMANDS: [u16; 9] = [0x1003, 0x1010, 0x1011, 0x6040, 0x6071, 0x607A, 0x60B0, 0x60B1, 0x60B2];
+const COMMANDS: [u16; 10] = [0x1003, 0x1010, 0x1011, 0x6040, 0x6071, 0x607A, 0x60B0, 0x60B1, 0x60B2, 0x60FF];
 /// 1010h:01 while the drive saves, and when it can be asked to (CiA 301).
 const BUSY: u32 = 0;
 const SAVES_ON_COMMAND: u32 = 1;

@@ -6,6 +6,10 @@
 
 use masseter_can::canopen::{AbortCode, BlockMessage, BlockSegment, block_crc};
 
+/// Segments of a block that a client sends. A client sends a whole block at once: transmit queues hold 64 frames, and a
+/// block whose last segment is lost ends only by a time-out.
+pub(super) const BLOCK_SIZE: u8 = 32;
+
 /// An object that the server sends.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct BlockUpload {
@@ -126,9 +130,9 @@ impl BlockDownload {
         if self.received.len() >= self.room + BlockSegment::DATA {
             return Err(AbortCode::TOO_LONG);
         }
-        let ends = segment.is_last || segment.sequence == BlockSegment::MAX;
+        let ends = segment.is_last || segment.sequence == BLOCK_SIZE;
         let sequence = ends.then(|| std::mem::take(&mut self.sequence));
-        Ok(sequence.map(|sequence| BlockMessage::Acknowledge { sequence, block_size: BlockSegment::MAX }))
+        Ok(sequence.map(|sequence| BlockMessage::Acknowledge { sequence, block_size: BLOCK_SIZE }))
     }
 
     /// The data, once the client has sent all.

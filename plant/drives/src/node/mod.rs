@@ -517,7 +517,8 @@ impl DriveNode {
         }
     }
 
-    /// Objects of the profile take effect: targets wait for SYNC, a new configuration comes before the controlword.
+    /// Objects of the profile take effect: cyclic targets wait for SYNC, a new configuration comes before the
+    /// controlword, and the controlword before the targets of profiles.
     fn act(&mut self, Effects { targets, configures, commands }: Effects, now_ns: u64) {
         self.process_data.add_targets(targets);
         if configures {
@@ -529,6 +530,7 @@ impl DriveNode {
                 self.clear(error);
             }
         }
+        self.axis.retarget(now_ns, &self.objects);
     }
 
     fn raise(&mut self, error: EmergencyCode) {

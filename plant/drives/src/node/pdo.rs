@@ -56,6 +56,7 @@ impl ProcessData {
     pub(super) fn add_targets(&mut self, targets: NewTargets) {
         self.new_targets.position |= targets.position;
         self.new_targets.torque |= targets.torque;
+        self.new_targets.velocity |= targets.velocity;
     }
 
     /// Whether any TPDO is sent at events instead of SYNC.
@@ -174,7 +175,7 @@ pub(crate) struct Rpdo {
 /// Effects of written objects beyond the dictionary.
 #[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Effects {
-    /// Cyclic targets (607Ah, 6071h).
+    /// Targets (607Ah, 6071h, 60FFh).
     pub(crate) targets: NewTargets,
     /// Power states (6040h).
     pub(crate) commands: bool,
@@ -193,6 +194,7 @@ impl Effects {
                 0x607A => effects.targets.position = true,
                 // Offsets take effect with the next target, so that an old target moves nothing.
                 0x60B0..=0x60B2 => {}
+                0x60FF => effects.targets.velocity = true,
                 0x6000.. => effects.configures = true,
                 _ => {}
             }

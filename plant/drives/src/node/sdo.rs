@@ -8,7 +8,7 @@ use masseter_can::canopen::{
 };
 
 use super::access::{DictionaryAccess, Value};
-use super::block::{BlockDownload, BlockUpload};
+use super::block::{BLOCK_SIZE, BlockDownload, BlockUpload};
 
 /// Silence of a client that ends a transfer, ns.
 const TIMEOUT_NS: u64 = 1_000_000_000;
@@ -229,8 +229,7 @@ fn begin_block_download(
     access: &DictionaryAccess<'_>,
 ) -> Answer {
     let room = access.room(object, size)?;
-    let response =
-        BlockMessage::Receive { object, has_crc: true, block_size: BlockSegment::MAX, threshold: 0 };
+    let response = BlockMessage::Receive { object, has_crc: true, block_size: BLOCK_SIZE, threshold: 0 };
     let progress = Progress::BlockDownload(BlockDownload::new(has_crc, size, room));
     Ok((Some(response.encode()), Some(Transfer::begin(access.now_ns, object, progress))))
 }

@@ -9,7 +9,9 @@ const POSITION_DEMAND: (u16, u8) = (0x6062, 0);
 /// The motor carries 5 N of 500 N, or the brake does.
 #[test]
 fn an_enabled_axis_holds_its_position_or_waits_behind_its_brake_for_a_cyclic_target() {
-    for (mode, permille) in [(PROFILE_POSITION, 10), (HOMING, 10), (CYCLIC_POSITION, 0), (CYCLIC_TORQUE, 0)] {
+    let holding = [PROFILE_POSITION, HOMING, PROFILE_VELOCITY].map(|mode| (mode, 10));
+    let waiting = [CYCLIC_POSITION, CYCLIC_VELOCITY, CYCLIC_TORQUE].map(|mode| (mode, 0));
+    for (mode, permille) in holding.into_iter().chain(waiting) {
         let mut bench = Bench::enabled(mode);
         bench.run_ms(200);
         assert_eq!(bench.read(TORQUE_ACTUAL), Ok(permille), "mode {mode}");

@@ -11,6 +11,7 @@ mod objects;
 mod process_data;
 mod quirks;
 mod sdo;
+mod velocity;
 
 use masseter_can::canopen::{
     AbortCode, Cob, Emergency, EmergencyCode, Expedited, Heartbeat, Nmt, NmtCommand, NmtState, NmtTarget,
@@ -238,6 +239,9 @@ pub(crate) const PROFILE_POSITION: i8 = 1;
 pub(crate) const HOMING: i8 = 6;
 pub(crate) const CYCLIC_POSITION: i8 = 8;
 pub(crate) const CYCLIC_TORQUE: i8 = 10;
+pub(crate) const PROFILE_VELOCITY: i8 = 3;
+pub(crate) const PROFILE_TORQUE: i8 = 4;
+pub(crate) const CYCLIC_VELOCITY: i8 = 9;
 
 /// RPDO1 as mapped after power-on.
 pub(crate) fn command(word: u16, target: i32) -> Frame {

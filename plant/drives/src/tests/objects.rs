@@ -23,7 +23,7 @@ fn what_may_not_be_written_is_aborted_with_the_reason() {
         ("below the lowest", (0x6007, 0), &[0xFF, 0xFF], AbortCode::TOO_LOW),
         ("no velocity", (0x6081, 0), &[0; 4], AbortCode::TOO_LOW),
         ("interpolation faster than 1 µs", (0x60C2, 2), &[(-7_i8) as u8], AbortCode::TOO_LOW),
-        ("profile velocity mode", MODE, &[3], AbortCode::INVALID_VALUE),
+        ("velocity mode", MODE, &[2], AbortCode::INVALID_VALUE),
         ("quick stop at the current limit", (0x605A, 0), &[3, 0], AbortCode::INVALID_VALUE),
         ("homing onto the home switch", (0x6098, 0), &[7], AbortCode::INVALID_VALUE),
         ("limits crossed", (0x607D, 1), &400_000_i32.to_le_bytes(), AbortCode::MAXIMUM_BELOW_MINIMUM),
