@@ -205,7 +205,7 @@ mod tests {
             for (section, names) in head {
                 names.split(' ').for_each(|name| assert!(!value(section, name).is_empty(), "{name}"));
             }
-            assert!(value("FileInfo", "FileName").ends_with(".eds"));
+            assert_eq!(value("FileInfo", "FileName").rsplit_once('.'), Some(("drive4", "eds")));
 
             let mut listed = Vec::new();
             for (list, holds) in [
@@ -226,7 +226,8 @@ mod tests {
             let is_object = |name: &str| name.len() == 4 && u16::from_str_radix(name, 16).is_ok();
             let mut described: Vec<_> =
                 sections.iter().map(|(name, _)| (*name).to_owned()).filter(|name| is_object(name)).collect();
-            (listed.sort(), described.sort());
+            listed.sort();
+            described.sort();
             assert_eq!(listed, described, "every object in one list, and with a section");
             let pdos = |first: char| {
                 let index = if first == 'R' { "140" } else { "180" };

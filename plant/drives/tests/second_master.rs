@@ -58,8 +58,8 @@ impl Master {
         self.receive(0x580 + u16::from(NODE)).try_into().unwrap()
     }
 
-    fn ask(&mut self, request: &SdoPayload) -> SdoPayload {
-        self.send(0x600 + u16::from(NODE), request);
+    fn ask(&mut self, request: SdoPayload) -> SdoPayload {
+        self.send(0x600 + u16::from(NODE), &request);
         self.answer()
     }
 
@@ -68,7 +68,7 @@ impl Master {
         let mut client = SdoClient::new(self.node);
         let mut request = begin(&mut client);
         loop {
-            match client.on_response(&self.ask(&request)) {
+            match client.on_response(&self.ask(request)) {
                 SdoEvent::Send(next) => request = next,
                 SdoEvent::Complete(value) => return Ok(value),
                 SdoEvent::Aborted(code) => return Err(code),
@@ -109,7 +109,7 @@ impl Master {
     }
 
     fn upload_in_blocks(&mut self, address: Address, block_size: u8) -> Vec<u8> {
-        let begun = self.ask(&block::encode_upload_initiate(address, block_size, true));
+        let begun = self.ask(block::encode_upload_initiate(address, block_size, true));
         assert!(block::decode_upload_initiate_response(&begun).unwrap().crc_support);
         let mut receiver = block::BlockReceiver::<1029>::new();
         self.send(0x600 + u16::from(NODE), &block::encode_upload_start());
@@ -132,7 +132,7 @@ impl Master {
     }
 
     fn download_in_blocks(&mut self, address: Address, data: &[u8]) {
-        let begun = self.ask(&block::encode_download_initiate(address, Some(data.len() as u32), true));
+        let begun = self.ask(block::encode_download_initiate(address, Some(data.len() as u32), true));
         let accepted = block::decode_download_initiate_response(&begun).unwrap();
         let mut writer = block::BlockWriter::new(data, accepted.blksize);
         while !writer.is_done() {
@@ -146,7 +146,7 @@ impl Master {
             assert_eq!(acknowledged, sent);
             writer.start_sub_block(next);
         }
-        block::decode_end_response(&self.ask(&writer.end_frame(accepted.crc_support))).unwrap();
+        block::decode_end_response(&self.ask(writer.end_frame(accepted.crc_support))).unwrap();
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! This module copies between frames and the object dictionary, and reports [`Effects`] and errors. It moves nothing,
 //! raises no emergency and answers no remote requests. A change of a parameter compiles the PDOs into copies of bytes;
-//! the rules of [SDO](super::sdo) decide the allowed changes.
+//! the rules of [access](super::access) decide the allowed changes.
 
 use std::cmp::Ordering;
 use std::collections::VecDeque;

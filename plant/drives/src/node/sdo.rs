@@ -76,13 +76,12 @@ impl SdoServer {
         let segment = transfer.as_ref().filter(|transfer| transfer.takes_segments());
         let (object, answer) = match (segment.and_then(|_| BlockSegment::decode(data)), request) {
             (Some(segment), _) => (running, take_segment(transfer, segment, access.now_ns)),
-            (None, Ok(SdoRequest::Abort { .. })) => return None,
+            (None, Ok(SdoRequest::Abort { .. }) | Err(SdoError::Length(_))) => return None,
             (None, Ok(request)) => take_request(transfer, request, running, access),
             (None, Err(SdoError::UnknownCommand { object, .. })) => match BlockMessage::decode(data) {
                 Some(message) => take_block_message(transfer, message, running, access),
                 None => (object, Err(AbortCode::UNKNOWN_COMMAND)),
             },
-            (None, Err(SdoError::Length(_))) => return None,
         };
         let abort = |code| (Some(SdoResponse::Abort { object, code }.encode()), None);
         let (response, transfer) = answer.unwrap_or_else(abort);

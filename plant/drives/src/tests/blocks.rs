@@ -163,15 +163,18 @@ fn data_of_any_length_come_back_as_they_were_written() {
     assert_eq!(client.bench.read((0x6081, 0)), Ok(0x0403_0201));
 }
 
-/// The frames of a transfer of 100 bytes, in both directions.
-fn transfers() -> [(fn(&mut Client) -> bool, usize); 2] {
+/// Transfers user data; whether the transfer succeeds.
+type Transfer = fn(&mut Client) -> bool;
+
+/// The transfers of 100 bytes in both directions, each with the number of its frames.
+fn transfers() -> [(Transfer, usize); 2] {
     fn up(client: &mut Client) -> bool {
         client.upload(USER_DATA).is_ok_and(|data| data == some(100))
     }
     fn down(client: &mut Client) -> bool {
         client.download(USER_DATA, &some(100)).is_ok()
     }
-    [up, down].map(|transfer: fn(&mut Client) -> bool| {
+    [up, down].map(|transfer: Transfer| {
         let mut client = prepared();
         assert!(transfer(&mut client));
         (transfer, client.frames)
