@@ -312,7 +312,7 @@ def test_a_frame_that_is_not_classical_is_refused(simulated: Maker) -> None:
     for options in [{"is_remote_frame": True}, {"is_fd": True}, {"is_error_frame": True}]:
         with pytest.raises(FrameError):
             bus.send(can.Message(arbitration_id=1, **options))
-    with pytest.raises(SettingError):
+    with pytest.raises(FrameError):
         bus.send(can.Message(arbitration_id=0x10001, is_extended_id=False, check=False))
 
 

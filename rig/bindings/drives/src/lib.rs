@@ -79,8 +79,8 @@ impl Bench {
         let settings = given::settings_of_all(settings)?;
         let no_rate = |reason| setting_error("bitrate", bitrate, &reason);
         let bitrate = Bitrate::new(bitrate).map_err(no_rate)?;
-        if !(1..=1_000_000).contains(&queue) {
-            return Err(setting_error("queue", queue, &"use 1 to 1000000 frames"));
+        if !(1..=100_000).contains(&queue) {
+            return Err(setting_error("queue", queue, &"use 1 to 100000 frames"));
         }
         let drives = settings.len();
         let buses = BUSES.min(PORTS - drives);
@@ -142,7 +142,7 @@ impl Bench {
             CanId::standard(u16::try_from(id).unwrap_or(u16::MAX))
         };
         let frame = id.and_then(|id| Frame::new(id, data));
-        let frame = frame.map_err(|refusal| setting_error("message", "frame", &refusal))?;
+        let frame = frame.map_err(|refusal| error("FrameError", (refusal.to_string(),)))?;
         self.with(py, |inner| {
             let now_ns = inner.now_ns;
             match inner.port(bus).send(now_ns, frame) {
