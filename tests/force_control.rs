@@ -64,7 +64,10 @@ fn the_stated_uncertainty_covers_robots_with_another_friction_than_the_model() {
     let robots = [
         ("", "slide_friction_n = 6.5\nviscous_friction_n_s_per_m = 26.0"),
         ("model = 'lugre'", ""),
-        ("model = 'lugre'\nbreakaway_ratio = 1.6", "slide_friction_n = 6.5\nviscous_friction_n_s_per_m = 26.0"),
+        (
+            "model = 'lugre'\nbreakaway_ratio = 1.6",
+            "slide_friction_n = 6.5\nviscous_friction_n_s_per_m = 26.0",
+        ),
         ("leg_screw_efficiency = 0.8\nslide_screw_efficiency = 0.8", ""),
     ];
     for (friction, dynamics) in robots {

@@ -90,7 +90,8 @@ fn near_rest_the_uncertainty_has_the_whole_breakaway_friction_of_the_legs() {
     let at_rest_n = (6f64.powi(2) + 1.1f64.powi(2) + 1.7f64.powi(2) + 0.5f64.powi(2)).sqrt();
     assert!((uncertainty_n(0.0) - at_rest_n).abs() < 0.2, "{}", uncertainty_n(0.0));
     // No law, but 30 % of 20 N s/m at 50 mm/s, and screws that lose 0.12 of 2.3 N a leg.
-    let moving_n = (1.1f64.powi(2) + 0.9f64.powi(2) + 1.7f64.powi(2) + 0.5f64.powi(2) + 0.8f64.powi(2)).sqrt();
+    let moving_n =
+        (1.1f64.powi(2) + 0.9f64.powi(2) + 1.7f64.powi(2) + 0.5f64.powi(2) + 0.8f64.powi(2)).sqrt();
     assert!((uncertainty_n(0.05) - moving_n).abs() < 0.2, "{}", uncertainty_n(0.05));
 }
 

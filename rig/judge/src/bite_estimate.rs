@@ -81,7 +81,8 @@ impl BiteEstimateWatch {
     /// None without a cycle.
     pub(super) fn into_figures(self) -> Option<BiteEstimateFigures> {
         let count = self.errors.len();
-        let at = |histogram: &Histogram<u64>, quantile| histogram.value_at_quantile(quantile) as f64 / STEPS_PER_N;
+        let at =
+            |histogram: &Histogram<u64>, quantile| histogram.value_at_quantile(quantile) as f64 / STEPS_PER_N;
         (count > 0).then(|| BiteEstimateFigures {
             error_rms_n: self.root_n / (count as f64).sqrt(),
             error_median_n: at(&self.errors, 0.5),
@@ -102,12 +103,14 @@ mod tests {
 
     #[test]
     fn figures_are_those_of_the_motion_and_phantoms_those_without_contact() {
-        let signal = |name: &str| Signal { name: name.to_owned(), unit: "N".to_owned(), about: String::new() };
+        let signal =
+            |name: &str| Signal { name: name.to_owned(), unit: "N".to_owned(), about: String::new() };
         let declared = Declared { signals: SIGNALS.map(signal).to_vec(), ..Declared::default() };
         assert!(BiteEstimateWatch::new(&Declared::default()).is_none());
         let mut watch = BiteEstimateWatch::new(&declared).unwrap();
         // Truth, estimate and uncertainty, N.
-        let cycles = [(0.0, 3.0, 2.0), (0.0, -1.0, 2.0), (20.0, 20.0, 2.0), (20.0, 18.0, 4.0), (20.0, f64::NAN, 1.0)];
+        let cycles =
+            [(0.0, 3.0, 2.0), (0.0, -1.0, 2.0), (20.0, 20.0, 2.0), (20.0, 18.0, 4.0), (20.0, f64::NAN, 1.0)];
         for (bite_force_n, estimate_n, uncertainty_n) in cycles {
             for state in [ControllerState::Running, ControllerState::Holding] {
                 let mut signals = Signals { signals: Values::zeros(2), ..Signals::default() };

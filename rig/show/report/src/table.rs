@@ -4,9 +4,8 @@ use std::fmt::Write;
 use std::path::Path;
 
 use masseter_judge::{
-    BiteEstimateFigures,
-    AxisFigures, BusResponse, EventRecord, Figures, IntervalFigures, PoseErrors, ReadingFigures,
-    ResponseFigures, TopicFigures, TrackingFigures, Verdict, whose_motion,
+    AxisFigures, BiteEstimateFigures, BusResponse, EventRecord, Figures, IntervalFigures, PoseErrors,
+    ReadingFigures, ResponseFigures, TopicFigures, TrackingFigures, Verdict, whose_motion,
 };
 use masseter_model::geometry::AXIS_NAMES;
 use masseter_recording::{Manifest, RunUsage, Usage};

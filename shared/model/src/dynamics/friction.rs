@@ -105,9 +105,10 @@ impl Friction {
         1.0 / efficiency - 1.0
     }
 
-    /// By how much this share changes where the efficiency differs by `doubt`.
+    /// By how much this share grows where the efficiency is smaller by `doubt`, at least a tenth.
     pub fn screw_doubt(&self, axis: usize, doubt: f64) -> f64 {
-        doubt * (1.0 + self.screw_loss(axis)).powi(2)
+        let inverse = 1.0 + self.screw_loss(axis);
+        1.0 / (1.0 / inverse - doubt).max(0.1) - inverse
     }
 
     /// Breakaway friction divided by Coulomb friction.

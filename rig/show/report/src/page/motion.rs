@@ -62,15 +62,15 @@ pub(super) fn motion_section(scenario: &Scenario, figures: &Figures) -> Section 
     }
     if figures.bite_force_max_n.is_some() {
         let mut series = vec![plain("bite force", &over_time.bite_force_n, 1.0)];
-        let shown = [("bite_force_n", "estimate"), ("bite_force_uncertainty_n", "uncertainty of the estimate")];
+        let shown =
+            [("bite_force_n", "estimate"), ("bite_force_uncertainty_n", "uncertainty of the estimate")];
         let place = |name: &str| figures.signals.iter().position(|of| of.signal.name == name);
-        series.extend(shown.into_iter().filter_map(|(signal, name)| {
-            Some(plain(name, over_time.signals.get(place(signal)?)?, 1.0))
-        }));
-        let force = Chart {
-            series,
-            ..Chart::over_time("Bite force, vertical", "N")
-        };
+        series.extend(
+            shown
+                .into_iter()
+                .filter_map(|(signal, name)| Some(plain(name, over_time.signals.get(place(signal)?)?, 1.0))),
+        );
+        let force = Chart { series, ..Chart::over_time("Bite force, vertical", "N") };
         blocks.push(Block::chart("bite", force));
     }
     Section::new("motion", "Motion", blocks)
@@ -120,7 +120,8 @@ fn motion_in_words(figures: &Figures) -> String {
     let estimate = tracking.estimate_rms_mm.map(|rms| format!("Estimated against true: rms {rms:.4} mm."));
     let bite = figures.bite_force_max_n.map(|most_n| format!("Bite force: at most {most_n:.1} N."));
     let sentences = [format!("Platform, {}.", table::distances(tracking))];
-    let of_bite = figures.bite_estimate.as_ref().map(|of| format!("Estimated bite force: {}.", table::estimated(of)));
+    let of_bite =
+        figures.bite_estimate.as_ref().map(|of| format!("Estimated bite force: {}.", table::estimated(of)));
     sentences.into_iter().chain(estimate).chain(bite).chain(of_bite).collect::<Vec<_>>().join(" ")
 }
 
