@@ -1,12 +1,12 @@
 //! Forces by the controller's own model of the mechanism: the model, the observer of external forces, and
 //! feed-forward. Nothing here controls a force.
 
-use self::calibration::Calibration;
 use masseter_model::dynamics::{Bodies, Equations, Friction, FrictionModel, Loads, Motion, Reactions};
 use masseter_model::geometry::{AXES, Mechanism, Pose, Twist};
 use masseter_runtime::messages::Reading;
 use masseter_runtime::named::Signal;
 use masseter_scenario::{ForceEstimateConfig, Scenario};
+use self::calibration::Calibration;
 use nalgebra::{SVector, Vector6};
 
 use crate::pose_law::{Detour, ExternalForce, PoseLaw};
@@ -132,12 +132,7 @@ impl Model {
     /// The model that the controller of a scenario assumes.
     pub(crate) fn new(scenario: &Scenario, mechanism: Mechanism) -> Self {
         let config = scenario.model();
-        Self {
-            mechanism,
-            bodies: Bodies::from(&config),
-            friction: Friction::new(&config),
-            law: config.friction.model,
-        }
+        Self { mechanism, bodies: Bodies::from(&config), friction: Friction::new(&config), law: config.friction.model }
     }
 
     /// The motion of a pose and a twist (m/s, rad/s); none for a pose without joint coordinates.
@@ -332,12 +327,7 @@ impl ForceObserver {
         if let Some(before) = last.driven {
             let weight_n = self.observe(&motion, &before, &driven);
             let loads_n = [&braking.coulomb_n, &braking.screw_n];
-            self.calibration.take_sample(
-                &motion.jacobian.actuators,
-                &self.residual,
-                &motion.rates_m_s,
-                loads_n,
-            );
+            self.calibration.take_sample(&motion.jacobian.actuators, &self.residual, &motion.rates_m_s, loads_n);
             // A doubt stays in the estimate as long as a force does.
             let now_n = self.bite_uncertainty_n(&motion, &braking, weight_n);
             let before_n = if self.uncertainty_n.is_finite() { self.uncertainty_n } else { now_n };
@@ -381,15 +371,9 @@ impl ForceObserver {
         let loads_n = [&braking.coulomb_n, &braking.screw_n];
         let calibrated = self.calibration.doubts_n(&motion.rates_m_s, loads_n);
         let of_friction = match calibrated {
-            // What is left of moving axes is mostly noise, and that of axes at rest has one cause.
-            Some([moving_n, at_rest_n, loaded_n]) => [
-                vertical.component_mul(&moving_n).norm(),
-                vertical.dot(&at_rest_n),
-                vertical.dot(&loaded_n.component_mul(&losses)),
-                0.0,
-                0.0,
-                0.0,
-            ],
+            Some([left_n, loaded_n]) => {
+                [vertical.dot(&left_n), vertical.dot(&loaded_n.component_mul(&losses)), 0.0, 0.0, 0.0, 0.0]
+            }
             None => {
                 let speeds_m_s = motion.rates_m_s.abs();
                 let unloaded_n = Vector6::from(friction.coulomb_n(&Loads::default()));

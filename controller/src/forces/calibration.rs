@@ -121,21 +121,19 @@ impl Calibration {
         })
     }
 
-    /// Bounds of what the calibration leaves of moving axes and of axes at rest, and the load of the screws beside that of the calibration, N; none
+    /// Bounds of what the calibration leaves of friction, and the load of the screws beside that of the calibration, N; none
     /// until the calibration is complete.
     pub(super) fn doubts_n(
         &self,
         speeds_m_s: &Vector6<f64>,
         [coulomb_n, screw_n]: [&Vector6<f64>; 2],
-    ) -> Option<[Vector6<f64>; 3]> {
+    ) -> Option<[Vector6<f64>; 2]> {
         let found = self.found.as_ref()?;
-        let left_n = |part: usize, share: &dyn Fn(f64) -> f64| {
-            Vector6::from_fn(|axis, _| 2.0 * coulomb_n[axis] * found[axis].left[part] * share(speeds_m_s[axis]))
-        };
-        let [moving_n, at_rest_n] =
-            [left_n(0, &|speed_m_s| 1.0 - self.rest(speed_m_s)), left_n(1, &|speed_m_s| self.rest(speed_m_s))];
-        let loaded_n = Vector6::from_fn(|axis, _| (screw_n[axis] - found[axis].screw_n).abs());
-        Some([moving_n, at_rest_n, loaded_n])
+        let left_n = Vector6::from_fn(|axis, _| {
+            let ([moving, at_rest], rest) = (found[axis].left, self.rest(speeds_m_s[axis]));
+            2.0 * coulomb_n[axis] * (moving + rest * (at_rest - moving))
+        });
+        Some([left_n, Vector6::from_fn(|axis, _| (screw_n[axis] - found[axis].screw_n).abs())])
     }
 }
 
