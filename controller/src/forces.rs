@@ -6,9 +6,9 @@ use masseter_model::geometry::{AXES, Mechanism, Pose, Twist};
 use masseter_runtime::messages::Reading;
 use masseter_runtime::named::Signal;
 use masseter_scenario::{ForceEstimateConfig, Scenario};
-use self::calibration::Calibration;
 use nalgebra::{SVector, Vector6};
 
+use crate::forces::calibration::Calibration;
 use crate::pose_law::{Detour, ExternalForce, PoseLaw};
 use crate::sequencer::Sequencer;
 
@@ -132,7 +132,12 @@ impl Model {
     /// The model that the controller of a scenario assumes.
     pub(crate) fn new(scenario: &Scenario, mechanism: Mechanism) -> Self {
         let config = scenario.model();
-        Self { mechanism, bodies: Bodies::from(&config), friction: Friction::new(&config), law: config.friction.model }
+        Self {
+            mechanism,
+            bodies: Bodies::from(&config),
+            friction: Friction::new(&config),
+            law: config.friction.model,
+        }
     }
 
     /// The motion of a pose and a twist (m/s, rad/s); none for a pose without joint coordinates.
@@ -229,9 +234,8 @@ struct Driven {
 /// is the external wrench behind a low-pass of the time constant T. No acceleration is needed. Between two samples the
 /// twist is the difference of the poses, and the force of a drive is the mean of that time.
 ///
-/// The bite force is the vertical component. Its uncertainty is a bound. The friction of a moving axis is known except
-/// for a share, that of an axis near rest only by its largest size. The drives round their forces: twice the standard
-/// deviation of this rounding counts.
+/// The bite force is the vertical component. Its uncertainty has terms for the level and the law of friction, screws, masses,
+/// delay and rounding. The uncertainty is no bound: docs/dynamics-control.md has the share of cycles that it covers.
 #[derive(Debug, Clone)]
 struct ForceObserver {
     model: Model,
@@ -327,7 +331,12 @@ impl ForceObserver {
         if let Some(before) = last.driven {
             let weight_n = self.observe(&motion, &before, &driven);
             let loads_n = [&braking.coulomb_n, &braking.screw_n];
-            self.calibration.take_sample(&motion.jacobian.actuators, &self.residual, &motion.rates_m_s, loads_n);
+            self.calibration.take_sample(
+                &motion.jacobian.actuators,
+                &self.residual,
+                &motion.rates_m_s,
+                loads_n,
+            );
             // A doubt stays in the estimate as long as a force does.
             let now_n = self.bite_uncertainty_n(&motion, &braking, weight_n);
             let before_n = if self.uncertainty_n.is_finite() { self.uncertainty_n } else { now_n };
