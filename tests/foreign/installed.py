@@ -159,7 +159,7 @@ def follow(installed: Installed, document: Path) -> int:
     assert len(said) == len(steps) + 1, f"{document}: the shell ended early"
     if ">>> " in text:
         packages = " ".join(re.findall(r"`pip install (\S+)`", text))
-        wheel = next(installed.sdk.glob("*.whl"))
+        wheel = next(installed.sdk.glob("masseter-*.whl"))
         installed.shell(f"pip install --quiet --disable-pip-version-check '{wheel}' {packages}")
         installed.shell(f"python -m doctest '{document}'", folder)
     return len(steps) + text.count(">>> ")
