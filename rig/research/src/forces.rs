@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::Context;
 use masseter_controller::motion_controller::MotionController;
-use masseter_judge::{Analysis, Curve, Figures, ToothFigures};
+use masseter_judge::{Analysis, Bearing, Curve, Figures, PressedTooth, ToothFigures};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plan::RunPlan;
 use masseter_recording::Manifest;
@@ -47,29 +47,58 @@ const AROUND_S: f64 = 0.1;
 const PRESSED: &str = include_str!("../../../examples/suite/pressed_teeth.toml");
 
 /// Plays the runs. Names and tables of their forces.
-pub(crate) fn play() -> anyhow::Result<[(&'static str, String); 4]> {
+pub(crate) fn play() -> anyhow::Result<[(&'static str, String); 5]> {
     let chewing =
         FRICTIONS.iter().map(|(_, friction)| cycle_forces(&run(&format!("{CHEWING}{friction}"))?.1));
     let chewing = chewing.collect::<anyhow::Result<Vec<_>>>()?;
-    let bites = BITES.iter().map(|(_, text)| bite(&run(text)?));
-    let bites = bites.collect::<anyhow::Result<Vec<_>>>()?;
+    let bitten_runs = BITES.iter().map(|(_, text)| run(text)).collect::<anyhow::Result<Vec<_>>>()?;
+    let bites = bitten_runs.iter().map(bite).collect::<anyhow::Result<Vec<_>>>()?;
     let forces = FRICTIONS.iter().zip(&chewing);
     let forces = forces.flat_map(|((name, _), forces)| curves(name, AXIS_NAMES.into_iter().zip(forces)));
     let bitten = BITES.iter().zip(&bites);
     let bitten = bitten.flat_map(|((food, _), forces)| curves(food, FORCES.into_iter().zip(forces)));
-    let (_, pressed) = run(PRESSED)?;
+    let (manifest, pressed) = run(PRESSED)?;
     let contact = pressed.contact.as_ref().context("the jaws have not touched")?;
     let at_s = contact.total_max_at_ns.saturating_sub(pressed.over_time.began_ns) as f64 / 1e9;
     let bite_n = pressed.bite_force_max_n.context("the jaws have not bitten")?;
+    let teeth = PressedTooth::all(&manifest.scenario);
+    let cusp = teeth.first().and_then(|tooth| tooth.cusp).context("the jaws have no teeth that meet")?;
     let tooth = |tooth: &ToothFigures| {
         let load_n = tooth.at_total_max_n.iter().map(|force_n| force_n * force_n).sum::<f64>().sqrt();
         let place_mm = [-tooth.place_m[1], tooth.place_m[0]].map(|place_m| place_m * 1e3);
-        (tooth.number, place_mm.map(number), [load_n, tooth.max_n].map(number))
+        (tooth.number, place_mm.map(number), [load_n, tooth.max_n].map(number), pressure(cusp, load_n))
     };
+    let course = |tooth: &ToothFigures| {
+        let points = tooth.course_n.iter();
+        let rows: Vec<_> = points
+            .map(|&(at_s, load_n)| ("pressed teeth", tooth.number, number(at_s), pressure(cusp, load_n)))
+            .collect();
+        rows
+    };
+    let mut courses: Vec<_> = contact.teeth.iter().flat_map(course).collect();
+    for ((name, _), (manifest, figures)) in BITES.iter().zip(&bitten_runs) {
+        for tooth in PressedTooth::all(&manifest.scenario) {
+            let found = figures.contact.iter().flat_map(|contact| &contact.teeth);
+            let Some((food, loads)) = tooth.food.zip(found.clone().find(|one| one.number == tooth.number))
+            else {
+                continue;
+            };
+            let row =
+                |&(at_s, load_n): &(f64, f64)| (*name, tooth.number, number(at_s), pressure(food, load_n));
+            courses.extend(loads.course_n.iter().map(row));
+        }
+    }
     Ok([
         ("forces", csv("friction,axis,time_s,force_n", forces)),
         ("bites", csv("food,force,time_s,force_n", bitten)),
-        ("pressure", csv("tooth,right_mm,forward_mm,force_n,greatest_n", contact.teeth.iter().map(tooth))),
+        (
+            "pressure",
+            csv(
+                "tooth,right_mm,forward_mm,force_n,greatest_n,area_mm2,mean_mpa,peak_mpa",
+                contact.teeth.iter().map(tooth),
+            ),
+        ),
+        ("pressures", csv("run,tooth,time_s,area_mm2,mean_mpa,peak_mpa", courses)),
         ("pressed", csv("time_s,teeth_n,bite_n", [[at_s, contact.total_max_n, bite_n].map(number)])),
     ])
 }
@@ -82,6 +111,12 @@ fn curves<'a>(
     curves.flat_map(move |(name, curve)| {
         curve.iter().map(move |&(at_s, force_n)| (run, name, [at_s, force_n].map(number)))
     })
+}
+
+/// Area, mean and highest pressure under a load, which friction raises by 3 % at most: mm² and MPa.
+fn pressure(bearing: Bearing, load_n: f64) -> [String; 3] {
+    let pressure = bearing.under(load_n);
+    [pressure.area_m2, pressure.mean_pa * 1e-12, pressure.peak_pa * 1e-12].map(|value| number(value * 1e6))
 }
 
 /// Plays a scenario under virtual time without a recording.

@@ -8,7 +8,7 @@ use nalgebra::{Translation3, UnitQuaternion};
 use rayon::prelude::*;
 
 use crate::solutions::SolutionSet;
-use crate::solver::{COMPARED, Found, Start, distance_rad};
+use crate::solver::{Found, SOLVERS, Start, distance_rad};
 use crate::tables::{csv, degrees, number};
 
 /// Basins of convergence: which solution of the neutral input each guess of a square grid leads to, row by row.
@@ -18,24 +18,22 @@ use crate::tables::{csv, degrees, number};
 pub(crate) fn basins_table(mechanism: &Mechanism, set: &SolutionSet, side: usize) -> String {
     let names = set.class_names();
     let middle = |index: usize| (index as f64 + 0.5) / side as f64 * PI;
-    let row = |index: usize| {
+    let cell = |index: usize| {
         let guess_rad = [middle(index % side), middle(index / side), set.true_one.theta_rad[2]];
         let start = Start { actuators: set.actuators, guess_rad };
-        let results = COMPARED.map(|solver| match solver.attempt(mechanism, &start) {
-            Ok(Found { theta_rad, iterations, .. }) => {
-                let class = set.class_of(&theta_rad);
-                (class.map_or("a leg below the base", |class| names[class].as_str()), iterations)
-            }
-            Err(_) => ("no solution reached", 0),
-        });
-        (guess_rad.map(degrees), results)
+        SOLVERS.map(|solver| {
+            let (reaches, iterations) = match solver.attempt(mechanism, &start) {
+                Ok(Found { theta_rad, iterations, .. }) => {
+                    let class = set.class_of(&theta_rad);
+                    (class.map_or("a leg below the base", |class| names[class].as_str()), iterations)
+                }
+                Err(_) => ("no solution reached", 0),
+            };
+            (guess_rad.map(degrees), solver.name, reaches, iterations)
+        })
     };
-    let rows: Vec<_> = (0..side * side).into_par_iter().map(row).collect();
-    csv(
-        "guess1_deg,guess2_deg,guess3_deg,published_reaches,published_iterations,newton_reaches,\
-         newton_iterations,controller_reaches,controller_iterations",
-        rows,
-    )
+    let cells: Vec<_> = (0..side * side).into_par_iter().map(cell).collect();
+    csv("guess1_deg,guess2_deg,guess3_deg,solver,reaches,iterations", cells.into_iter().flatten())
 }
 
 const MM: f64 = 1e-3;

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use self::Course::{Converges, Diverges, Fails, Oscillates};
 use crate::solver::{NEWTON, PUBLISHED, Start};
 use crate::tables::{csv, degrees, number};
-use crate::trials::{Guesses, Trial, Trials};
+use crate::trials::{ANYWHERE, Trial, Trials};
 
 /// Errors in which a cycle is looked for, the last ones of a trace.
 const TAIL: usize = 40;
@@ -61,7 +61,7 @@ pub(crate) struct Disagreement {
 /// Fig. 3: the paper's converges, Newton–Raphson falls at first and then diverges. Fig. 4: the paper's converges,
 /// Newton–Raphson oscillates. Not in the paper: Newton–Raphson converges, the paper's stalls.
 pub(crate) fn disagreements(mechanism: &Mechanism, trials: &Trials) -> [Disagreement; 3] {
-    let trials = trials.with(Guesses::AboveBase).par_iter();
+    let trials = trials.with(ANYWHERE).par_iter();
     let pairs: Vec<_> = trials.map(|trial| Pair::trace(mechanism, trial)).collect();
     let disagreement = |name, courses: [Course; 2], clearness: fn(&[f64]) -> f64| {
         let courses_of = |pair: &Pair| pair.traces.each_ref().map(|trace| trace.course);
@@ -79,7 +79,7 @@ pub(crate) fn disagreements(mechanism: &Mechanism, trials: &Trials) -> [Disagree
 
 /// How many trials show each, and in how many only one of the two reaches a solution.
 pub(crate) fn disagreements_table(disagreements: &[Disagreement], trials: &Trials) -> String {
-    let of = trials.with(Guesses::AboveBase).len();
+    let of = trials.with(ANYWHERE).len();
     let alone = ["published_alone", "newton_alone"].into_iter().zip(trials.alone());
     let all = disagreements.iter().map(|one| (one.name, one.trials)).chain(alone);
     csv("disagreement,trials,of", all.map(|(name, trials)| (name, trials, of)))
@@ -93,7 +93,7 @@ impl Disagreement {
             for (solver, trace) in [PUBLISHED, NEWTON].iter().zip(traces) {
                 for (iteration, error) in trace.errors_cm2.iter().enumerate() {
                     let guess = (start.actuators.to_axes().map(number), start.guess_rad.map(degrees));
-                    rows.push((solver.short_name, iteration, number(*error), guess));
+                    rows.push((solver.name, iteration, number(*error), guess));
                 }
             }
         }

@@ -28,7 +28,7 @@ pub(crate) fn generator(seed: u64, stream: Stream, case: usize) -> Pcg64Mcg {
 }
 
 /// An input anywhere in the strokes.
-fn random_input(mechanism: &Mechanism, random: &mut Pcg64Mcg) -> Actuators {
+pub(crate) fn random_input(mechanism: &Mechanism, random: &mut Pcg64Mcg) -> Actuators {
     let axes: [f64; AXES] = std::array::from_fn(|axis| {
         let [low_m, high_m] = mechanism.strokes().of_axis(axis);
         random.random_range(low_m..=high_m)
@@ -56,10 +56,10 @@ impl SolutionSet {
         Ok(Self { actuators, solutions, true_one })
     }
 
-    /// Of random inputs, drawn anew until one has exactly one true solution: about every other input has.
-    pub(crate) fn feasible(mechanism: &Mechanism, random: &mut Pcg64Mcg) -> Self {
+    /// Of random inputs, drawn anew until one has exactly one true solution: about every other input in the strokes has.
+    pub(crate) fn feasible(mechanism: &Mechanism, mut draw: impl FnMut() -> Actuators) -> Self {
         loop {
-            let actuators = random_input(mechanism, random);
+            let actuators = draw();
             let Ok(solutions) = Solutions::new(mechanism, &actuators) else { continue };
             let mut true_ones = solutions.true_ones().copied();
             if let (Some(true_one), None) = (true_ones.next(), true_ones.next()) {
@@ -204,8 +204,7 @@ mod tests {
     #[test]
     fn a_case_depends_only_on_its_number() {
         let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
-        let draw =
-            |case| SolutionSet::feasible(&mechanism, &mut generator(7, Stream::Trials, case)).actuators;
+        let draw = |case| random_input(&mechanism, &mut generator(7, Stream::Inputs, case));
         assert_eq!(draw(3), draw(3));
         assert_ne!(draw(3), draw(4));
     }

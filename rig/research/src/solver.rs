@@ -3,7 +3,7 @@
 use std::f64::consts::{PI, TAU};
 
 use masseter_controller::kinematics::Residual::{Distance, SquaredDistance};
-use masseter_controller::kinematics::StepRule::{CautiousHalving, Halving, QuadraticBacktracking};
+use masseter_controller::kinematics::StepRule::{BoundedStep, FullStep, TimeStep};
 use masseter_controller::kinematics::{
     ForwardTracker, Iteration, MAX_HALVINGS, MAX_ITERATIONS, Method, Options, Residual, StepRule,
     solve_traced,
@@ -13,48 +13,43 @@ use masseter_model::geometry::{Actuators, LEGS, Mechanism};
 /// A solver with its choices.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Solver {
-    /// The full name.
     pub name: &'static str,
-    /// The name in a legend of [`COMPARED`].
-    pub short_name: &'static str,
     /// None for the controller's certified solver, which takes the guess as its last solution.
     iteration: Option<(Method, Residual, StepRule)>,
 }
 
-/// The paper's algorithm (Fig. 2), with the two choices that its text leaves open.
-const fn published(name: &'static str, residual: Residual, step: StepRule) -> Solver {
-    Solver { name, short_name: "published", iteration: Some((Method::Published, residual, step)) }
+/// A reading of the paper's algorithm (Fig. 2), with the two choices that its text leaves open.
+const fn reading(name: &'static str, residual: Residual, step: StepRule) -> Solver {
+    Solver { name, iteration: Some((Method::Published, residual, step)) }
 }
 
 /// Newton–Raphson with the full increment.
 const fn newton(name: &'static str, residual: Residual) -> Solver {
-    let iteration = Some((Method::Newton, residual, Halving));
-    Solver { name, short_name: "Newton–Raphson", iteration }
+    Solver { name, iteration: Some((Method::Newton, residual, FullStep)) }
 }
 
 /// The paper's algorithm as printed: distances (eq. 1), the increment halved until the error decreases.
-pub(crate) const PUBLISHED: Solver = published("published, distances, halving", Distance, Halving);
+pub(crate) const PUBLISHED: Solver = reading("reduced full steps, distances", Distance, FullStep);
 /// Newton–Raphson on the equations as printed.
 pub(crate) const NEWTON: Solver = newton("Newton–Raphson, distances", Distance);
 const NEWTON_SQUARED: Solver = newton("Newton–Raphson, squared distances", SquaredDistance);
 /// The controller's certified solver.
-pub(crate) const CONTROLLER: Solver =
-    Solver { name: "controller", short_name: "controller", iteration: None };
+pub(crate) const CONTROLLER: Solver = Solver { name: "controller", iteration: None };
 
-/// All of them.
+/// All of them: the readings, Newton–Raphson with each residual, and the controller's.
 pub(crate) const SOLVERS: [Solver; 9] = [
     PUBLISHED,
-    published("published, distances, cautious halving", Distance, CautiousHalving),
-    published("published, distances, quadratic backtracking", Distance, QuadraticBacktracking),
-    published("published, squared distances, halving", SquaredDistance, Halving),
-    published("published, squared distances, cautious halving", SquaredDistance, CautiousHalving),
-    published("published, squared distances, quadratic backtracking", SquaredDistance, QuadraticBacktracking),
+    reading("bounded increments, distances", Distance, BoundedStep),
+    reading("time steps, distances", Distance, TimeStep),
+    reading("reduced full steps, squared distances", SquaredDistance, FullStep),
+    reading("bounded increments, squared distances", SquaredDistance, BoundedStep),
+    reading("time steps, squared distances", SquaredDistance, TimeStep),
     NEWTON,
     NEWTON_SQUARED,
     CONTROLLER,
 ];
-/// The three that the figures show, in this order.
-pub(crate) const COMPARED: [Solver; 3] = [PUBLISHED, NEWTON, CONTROLLER];
+/// The three whose times are compared, in this order.
+pub(crate) const TIMED: [Solver; 3] = [PUBLISHED, NEWTON, CONTROLLER];
 
 /// What a solver starts with.
 #[derive(Debug, Clone, Copy)]
@@ -74,11 +69,6 @@ pub(crate) struct Found {
 }
 
 impl Solver {
-    /// Whether it is the paper's, with any choices.
-    pub(crate) fn is_published(self) -> bool {
-        matches!(self.iteration, Some((Method::Published, ..)))
-    }
-
     /// Newton–Raphson with the same residual.
     pub(crate) fn rival(self) -> Self {
         match self.iteration {

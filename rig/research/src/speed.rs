@@ -7,9 +7,9 @@ use masseter_model::geometry::Mechanism;
 use masseter_runtime::clock;
 
 use crate::motions::{CYCLE_S, Motion};
-use crate::solver::{COMPARED, Solver, Start};
+use crate::solver::{Solver, Start, TIMED};
 use crate::tables::{csv, number, quantile};
-use crate::trials::{Guesses, Trial, Trials};
+use crate::trials::{ANYWHERE, Trial, Trials};
 
 /// Cases timed in each situation.
 const CASES: usize = 2000;
@@ -19,8 +19,8 @@ const CALLS: u32 = 8;
 /// From random guesses above the base from which all three solvers reach a solution; and from the solution one
 /// millisecond of chewing before. Takes one core; nothing else of the study runs meanwhile.
 pub(crate) fn table(mechanism: &Mechanism, trials: &Trials, chewing: &Motion) -> String {
-    let random = trials.with(Guesses::AboveBase).iter();
-    let all_arrive = |trial: &&Trial| COMPARED.into_iter().all(|solver| trial.by(solver).is_ok());
+    let random = trials.with(ANYWHERE).iter();
+    let all_arrive = |trial: &&Trial| TIMED.into_iter().all(|solver| trial.by(solver).is_ok());
     let random: Vec<_> = random.filter(all_arrive).take(CASES).map(|trial| trial.start).collect();
     let situations = [
         ("random guess above the base", random),
@@ -29,7 +29,7 @@ pub(crate) fn table(mechanism: &Mechanism, trials: &Trials, chewing: &Motion) ->
     let rows = situations.into_iter().flat_map(|(name, cases)| {
         let times = in_turns(mechanism, &cases);
         let [_, [newton_ns, _], _] = times;
-        COMPARED.into_iter().zip(times).map(move |(solver, [median_ns, p99_ns])| {
+        TIMED.into_iter().zip(times).map(move |(solver, [median_ns, p99_ns])| {
             (name, solver.name, cases.len(), [median_ns, p99_ns, median_ns / newton_ns].map(number))
         })
     });
@@ -44,10 +44,10 @@ fn warm(mechanism: &Mechanism, motion: &Motion) -> Vec<Start> {
 }
 
 /// Median and 99th percentile of each solver, ns. Every case goes to every solver before the next case.
-fn in_turns(mechanism: &Mechanism, cases: &[Start]) -> [[f64; 2]; COMPARED.len()] {
-    let mut taken_ns = COMPARED.map(|_| Vec::with_capacity(cases.len()));
+fn in_turns(mechanism: &Mechanism, cases: &[Start]) -> [[f64; 2]; TIMED.len()] {
+    let mut taken_ns = TIMED.map(|_| Vec::with_capacity(cases.len()));
     for start in cases {
-        for (solver, taken_ns) in COMPARED.into_iter().zip(&mut taken_ns) {
+        for (solver, taken_ns) in TIMED.into_iter().zip(&mut taken_ns) {
             taken_ns.push(time_ns(solver, mechanism, start));
         }
     }

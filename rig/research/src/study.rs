@@ -58,13 +58,12 @@ impl Study {
         let Self { mechanism, motions } = self;
         let Settings { seed, samples, cells } = settings;
         progress(&format!("{samples} random guesses of each kind"));
-        let trials = Trials::run(mechanism, samples, seed);
+        let trials = Trials::run(mechanism, motions, samples, seed);
         let pairs = pairs::disagreements(mechanism, &trials);
         let set = SolutionSet::neutral(mechanism)?;
         let mut tables = vec![
             ("success", trials.success_table()),
             ("iterations", trials.iterations_table()),
-            ("cost", trials.cost_table()),
             ("disagreements", pairs::disagreements_table(&pairs, &trials)),
             ("fig8_solutions", set.table(mechanism)),
             ("mechanism", slides_table(mechanism, &set)),

@@ -2,21 +2,53 @@
 //!
 //! Each case draws from a generator of its own, so that the order in which cores take them changes nothing.
 
+use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-use masseter_controller::kinematics::Assembly;
-use masseter_model::geometry::{LEGS, Mechanism};
+use masseter_controller::kinematics::{Assembly, MAX_ITERATIONS};
+use masseter_model::geometry::{Actuators, LEGS, Mechanism};
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
 use self::Guesses::{AboveBase, Within};
-use crate::solutions::{SolutionSet, Stream, generator};
+use self::Inputs::{Jaw, Strokes};
+use crate::motions::Motion;
+use crate::solutions::{SolutionSet, Stream, generator, random_input};
 use crate::solver::{Found, NEWTON, PUBLISHED, SOLVERS, Solver, Start, distance_rad};
 use crate::tables::{csv, number, quantile};
 
 /// A root counts as the closest when no other is closer by more than this, radians.
 const TIE_RAD: f64 = 1e-6;
+
+/// Iterations that are allowed: the paper states no number. The last is no bound in practice.
+const CAPS: [u32; 5] = [10, 20, 50, 100, MAX_ITERATIONS];
+
+/// Where inputs come from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Inputs {
+    /// Anywhere in the strokes.
+    Strokes,
+    /// Any instant of a motion of the jaw, every motion as often.
+    Jaw,
+}
+
+impl Inputs {
+    /// The name in tables.
+    fn name(self) -> &'static str {
+        match self {
+            Strokes => "whole strokes",
+            Jaw => "jaw motions",
+        }
+    }
+
+    fn draw(self, mechanism: &Mechanism, motions: &[Motion], random: &mut Pcg64Mcg) -> Actuators {
+        match self {
+            Strokes => random_input(mechanism, random),
+            Jaw => motions[random.random_range(0..motions.len())].input(mechanism, random),
+        }
+    }
+}
 
 /// Where guesses come from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,16 +59,23 @@ pub(crate) enum Guesses {
     AboveBase,
 }
 
-/// The origins of the trials' guesses, nearest first.
-pub(crate) const GUESSES: [Guesses; 8] = [
-    Within(2.0),
-    Within(5.0),
-    Within(10.0),
-    Within(15.0),
-    Within(20.0),
-    Within(30.0),
-    Within(60.0),
-    AboveBase,
+/// Inputs and their guesses.
+pub(crate) type Origin = (Inputs, Guesses);
+
+/// The widest origin.
+pub(crate) const ANYWHERE: Origin = (Strokes, AboveBase);
+/// All of them, the nearest guesses first.
+const ORIGINS: [Origin; 10] = [
+    (Strokes, Within(2.0)),
+    (Strokes, Within(5.0)),
+    (Strokes, Within(10.0)),
+    (Strokes, Within(15.0)),
+    (Strokes, Within(20.0)),
+    (Strokes, Within(30.0)),
+    (Strokes, Within(60.0)),
+    ANYWHERE,
+    (Jaw, Within(5.0)),
+    (Jaw, AboveBase),
 ];
 
 impl Guesses {
@@ -89,17 +128,17 @@ impl Trial {
     }
 }
 
-/// All trials: `samples` for each of [`GUESSES`].
+/// All trials: `samples` for each of [`ORIGINS`].
 #[derive(Debug, Clone)]
 pub(crate) struct Trials {
     sets: Vec<Vec<Trial>>,
 }
 
 impl Trials {
-    pub(crate) fn run(mechanism: &Mechanism, samples: usize, seed: u64) -> Self {
-        let trial = |guesses: Guesses, case| {
+    pub(crate) fn run(mechanism: &Mechanism, motions: &[Motion], samples: usize, seed: u64) -> Self {
+        let trial = |(inputs, guesses): Origin, case| {
             let mut random = generator(seed, Stream::Trials, case);
-            let input = SolutionSet::feasible(mechanism, &mut random);
+            let input = SolutionSet::feasible(mechanism, || inputs.draw(mechanism, motions, &mut random));
             let guess_rad = guesses.draw(&input.true_one.theta_rad, &mut random);
             let start = Start { actuators: input.actuators, guess_rad };
             let outcomes = SOLVERS.map(|solver| {
@@ -108,79 +147,64 @@ impl Trials {
             });
             Trial { start, outcomes }
         };
-        let set = |guesses| (0..samples).into_par_iter().map(|case| trial(guesses, case)).collect();
-        Self { sets: GUESSES.into_iter().map(set).collect() }
+        let set = |origin| (0..samples).into_par_iter().map(|case| trial(origin, case)).collect();
+        Self { sets: ORIGINS.into_iter().map(set).collect() }
     }
 
-    /// The trials with guesses from this origin.
+    /// The trials of this origin.
     ///
     /// # Panics
-    /// When [`GUESSES`] lacks the origin.
-    pub(crate) fn with(&self, guesses: Guesses) -> &[Trial] {
-        let set = GUESSES.iter().position(|&set| set == guesses);
-        &self.sets[set.expect("guesses are drawn from there")]
+    /// When [`ORIGINS`] lacks it.
+    pub(crate) fn with(&self, origin: Origin) -> &[Trial] {
+        let set = ORIGINS.iter().position(|&set| set == origin);
+        &self.sets[set.expect("trials have that origin")]
     }
 
-    /// The outcomes of one solver with guesses from this origin.
-    fn outcomes(&self, solver: Solver, guesses: Guesses) -> impl Iterator<Item = TrialResult> {
-        self.with(guesses).iter().map(move |trial| trial.by(solver))
+    /// The solutions that a solver reaches within so many iterations; `None` where it reaches none.
+    fn reached(&self, solver: Solver, origin: Origin, cap: u32) -> impl Iterator<Item = Option<Reached>> {
+        let within = move |reached: &Reached| reached.found.iterations <= cap;
+        self.with(origin).iter().map(move |trial| trial.by(solver).ok().filter(within))
     }
 
-    /// What a solver and Newton–Raphson (same residual) find where both reach a solution.
-    fn against_newton(&self, solver: Solver, guesses: Guesses) -> Vec<[Found; 2]> {
-        let both = self.outcomes(solver, guesses).zip(self.outcomes(solver.rival(), guesses));
-        both.filter_map(|(a, b)| Some([a.ok()?.found, b.ok()?.found])).collect()
-    }
-
-    /// Success rates, one row for each solver and origin of guesses.
+    /// Success and cost, one row for each origin, solver and cap. Costs are those of the trials in which the solver and
+    /// Newton–Raphson with the same residual both reach a solution.
     pub(crate) fn success_table(&self) -> String {
-        let row = |(guesses, solver): (Guesses, Solver)| {
-            let reached =
-                |is: fn(&Reached) -> bool| self.outcomes(solver, guesses).flatten().filter(is).count();
-            let failed = |end: &str| self.outcomes(solver, guesses).filter(|one| *one == Err(end)).count();
-            let (trials, solved, is_true) =
-                (self.with(guesses).len(), reached(|_| true), reached(|one| one.is_true));
-            let known = ["stalled", "singular", "no_convergence"].map(failed);
-            let refused = trials - solved - known.iter().sum::<usize>();
-            let closest = reached(|one| one.is_closest);
-            (guesses.name(), solver.name, trials, [is_true, solved - is_true], known, refused, closest)
-        };
-        csv(
-            "guesses,solver,trials,reached_true,reached_other,stalled,singular,no_convergence,refused,reached_closest",
-            every_combination().map(row),
-        )
-    }
-
-    /// Distribution of iterations from guesses anywhere above the base.
-    pub(crate) fn iterations_table(&self) -> String {
-        let rows = SOLVERS.into_iter().flat_map(|solver| {
-            let reached = self.outcomes(solver, AboveBase).flatten();
-            let taken: Vec<_> = reached.map(|reached| reached.found.iterations).collect();
-            let end = taken.iter().max().map_or(0, |most| most + 1);
-            (0..end).map(move |iterations| {
-                (solver.name, iterations, taken.iter().filter(|&&one| one == iterations).count())
-            })
-        });
-        csv("solver,iterations,trials", rows)
-    }
-
-    /// Iterations of the paper's variants and of Newton–Raphson where both reach a solution.
-    pub(crate) fn cost_table(&self) -> String {
-        let row = |(guesses, solver): (Guesses, Solver)| {
-            let both = self.against_newton(solver, guesses);
+        let row = |(origin, solver, cap): (Origin, Solver, u32)| {
+            let hits =
+                |is: fn(&Reached) -> bool| self.reached(solver, origin, cap).flatten().filter(is).count();
+            let (solved, is_true) = (hits(|_| true), hits(|one| one.is_true));
+            let both = self.reached(solver, origin, cap).zip(self.reached(solver.rival(), origin, cap));
+            let both: Vec<_> = both.filter_map(|(a, b)| Some([a?.found, b?.found])).collect();
             let costs = [0, 1].map(|side| {
                 let iterations = || both.iter().map(|pair| f64::from(pair[side].iterations));
                 let evaluations = both.iter().map(|pair| f64::from(pair[side].evaluations));
                 [quantile(iterations(), 0.5), quantile(iterations(), 0.9), quantile(evaluations, 0.5)]
                     .map(number)
             });
-            (guesses.name(), solver.name, both.len(), costs)
+            let (inputs, guesses) = (origin.0.name(), origin.1.name());
+            let trials = self.with(origin).len();
+            let reached = [trials, is_true, solved - is_true, hits(|one| one.is_closest), both.len()];
+            (inputs, guesses, solver.name, cap, reached, costs)
         };
+        let all = ORIGINS.into_iter().flat_map(|origin| SOLVERS.map(|solver| (origin, solver)));
         csv(
-            "guesses,solver,solved_by_both,iterations_median,iterations_p90,evaluations_median,\
-             newton_iterations_median,newton_iterations_p90,newton_evaluations_median",
-            every_combination().filter(|(_, solver)| solver.is_published()).map(row),
+            "inputs,guesses,solver,most_iterations,trials,reached_true,reached_other,reached_closest,solved_by_both,\
+             iterations_median,iterations_p90,evaluations_median,newton_iterations_median,newton_iterations_p90,\
+             newton_evaluations_median",
+            all.flat_map(|(origin, solver)| CAPS.map(|cap| row((origin, solver, cap)))),
         )
+    }
+
+    /// Distribution of iterations from guesses anywhere above the base.
+    pub(crate) fn iterations_table(&self) -> String {
+        let rows = SOLVERS.into_iter().flat_map(|solver| {
+            let mut taken = BTreeMap::new();
+            for reached in self.reached(solver, ANYWHERE, MAX_ITERATIONS).flatten() {
+                *taken.entry(reached.found.iterations).or_insert(0) += 1;
+            }
+            taken.into_iter().map(move |(iterations, trials)| (solver.name, iterations, trials))
+        });
+        csv("solver,iterations,trials", rows)
     }
 
     /// Trials above the base in which only one of the two reaches a solution:
@@ -189,13 +213,9 @@ impl Trials {
         [[true, false], [false, true]].map(|wanted| {
             let solved =
                 |trial: &&Trial| [PUBLISHED, NEWTON].map(|solver| trial.by(solver).is_ok()) == wanted;
-            self.with(AboveBase).iter().filter(solved).count()
+            self.with(ANYWHERE).iter().filter(solved).count()
         })
     }
-}
-
-fn every_combination() -> impl Iterator<Item = (Guesses, Solver)> {
-    GUESSES.into_iter().flat_map(|guesses| SOLVERS.map(|solver| (guesses, solver)))
 }
 
 fn reached(mechanism: &Mechanism, input: &SolutionSet, guess_rad: &[f64; LEGS], found: Found) -> Reached {
@@ -216,7 +236,7 @@ mod tests {
     fn guesses_stay_within_their_range() {
         let mut random = generator(1, Stream::Trials, 0);
         let truth = [1.4, 1.5, 1.6];
-        for guesses in GUESSES {
+        for (_, guesses) in ORIGINS {
             for _ in 0..100 {
                 let guess = guesses.draw(&truth, &mut random);
                 match guesses {

@@ -7,19 +7,20 @@ use std::process::{Command, Output};
 /// The executable under test.
 const RESEARCH: &str = env!("CARGO_BIN_EXE_masseter-research");
 
-/// Where guesses are drawn from: within so many degrees of the true angles, and anywhere above the base.
-const ORIGINS_OF_GUESSES: usize = 8;
+/// Inputs and their guesses, and the numbers of iterations that are allowed.
+const ORIGINS_AND_CAPS: usize = 10 * 5;
+/// Six readings of the paper, Newton–Raphson with two residuals, and the controller's.
+const SOLVERS: usize = 9;
 const TABLES: [(&str, &str); 23] = [
     ("fig3_diverging", "solver,iteration,error_cm2,d1_m,"),
     ("fig4_oscillating", "solver,iteration,error_cm2,d1_m,"),
     ("fig3b_stalling", "solver,iteration,error_cm2,d1_m,"),
-    ("success", "guesses,solver,trials,reached_true,reached_other,stalled,"),
+    ("success", "inputs,guesses,solver,most_iterations,trials,reached_true,reached_other,"),
     ("iterations", "solver,iterations,trials"),
-    ("cost", "guesses,solver,solved_by_both,iterations_median,"),
     ("speed", "start,solver,cases,median_ns,p99_ns,"),
     ("fig8_solutions", "theta1_deg,theta2_deg,theta3_deg,above_base,"),
     ("multiplicity", "counted,solutions,inputs"),
-    ("basins", "guess1_deg,guess2_deg,guess3_deg,published_reaches,"),
+    ("basins", "guess1_deg,guess2_deg,guess3_deg,solver,reaches,iterations"),
     ("motions", "motion,within_limits,least_slide_margin_m,"),
     ("workspace_x_z", "x_mm,z_mm,condition,determinant,regular_within_deg,separation_deg"),
     ("workspace_y_z", "y_mm,z_mm,condition,"),
@@ -32,7 +33,8 @@ const TABLES: [(&str, &str); 23] = [
     ("pressed", "time_s,teeth_n,bite_n"),
     ("disagreements", "disagreement,trials,of"),
     ("settings", "version,seed,samples,command"),
-    ("pressure", "tooth,right_mm,forward_mm,force_n,greatest_n"),
+    ("pressure", "tooth,right_mm,forward_mm,force_n,greatest_n,area_mm2,mean_mpa,peak_mpa"),
+    ("pressures", "run,tooth,time_s,area_mm2,mean_mpa,peak_mpa"),
 ];
 
 fn research(arguments: &[&str]) -> Output {
@@ -80,13 +82,16 @@ fn what_is_certain_is_found() {
     let folder = place.path().join("study");
     assert_eq!(study(&folder, &[]).status.code(), Some(0));
     assert_eq!(read(&folder, "fig8_solutions.csv").lines().count(), 1 + 16);
-    assert_eq!(read(&folder, "basins.csv").lines().count(), 1 + 6 * 6);
+    assert_eq!(read(&folder, "basins.csv").lines().count(), 1 + 6 * 6 * SOLVERS);
     let success = read(&folder, "success.csv");
     let controllers: Vec<_> = success.lines().filter(|line| line.contains(",controller,")).collect();
-    assert_eq!(controllers.len(), ORIGINS_OF_GUESSES, "{success}");
+    assert_eq!(controllers.len(), ORIGINS_AND_CAPS, "{success}");
     for line in controllers {
-        assert!(line.contains(",controller,80,80,0,0,0,0,0,"), "{line}");
+        assert!(line.split(',').skip(4).take(3).eq(["80", "80", "0"]), "{line}");
     }
+    // A time step of 0.1 leaves nine tenths of the residual: more iterations than 100, whatever the guess.
+    let stepped = success.lines().filter(|line| line.contains("\"time steps, distances\",100,80,"));
+    assert!(stepped.clone().count() == 10 && stepped.clone().all(|line| line.contains(",100,80,0,0,0,0,")));
 }
 
 #[test]

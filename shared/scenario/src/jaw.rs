@@ -95,6 +95,8 @@ section! {
         pub damping_s_per_m: f64 = 2.5 => Within(0.0, 20.0),
         /// Friction of enamel on enamel.
         pub friction: f64 = 0.23 => Within(0.0, 2.0),
+        /// Radius of the cusp in which a pair of teeth meets, for the pressure alone (assumption).
+        pub cusp_radius_m: f64 = 2e-3 => Within(0.0001, 0.1),
         /// Teeth at other places than those of the default arch.
         #[serde(skip_serializing_if = "Vec::is_empty")]
         pub tooth: Vec<ToothConfig> = Vec::new(),

@@ -36,6 +36,10 @@ pub enum Dimension {
     Power,
     /// Joules.
     Energy,
+    /// Square metres.
+    Area,
+    /// Pascals.
+    Pressure,
 }
 
 /// A unit: its name, its kind, and its size in SI units.
@@ -53,7 +57,7 @@ pub struct Unit {
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 
 /// Every unit. The first of a kind is its SI unit.
-pub const UNITS: [Unit; 30] = {
+pub const UNITS: [Unit; 34] = {
     use Dimension as D;
     const fn unit(name: &'static str, dimension: Dimension, si: f64) -> Unit {
         Unit { name, dimension, si }
@@ -89,6 +93,10 @@ pub const UNITS: [Unit; 30] = {
         unit("g", D::Mass, 1e-3),
         unit("W", D::Power, 1.0),
         unit("J", D::Energy, 1.0),
+        unit("m2", D::Area, 1.0),
+        Unit::MM2,
+        unit("Pa", D::Pressure, 1.0),
+        Unit::MPA,
     ]
 };
 
@@ -111,6 +119,10 @@ impl Unit {
     pub const MS: Self = Self { name: "ms", dimension: Dimension::Time, si: 1e-3 };
     /// Microseconds.
     pub const US: Self = Self { name: "us", dimension: Dimension::Time, si: 1e-6 };
+    /// Square millimetres.
+    pub const MM2: Self = Self { name: "mm2", dimension: Dimension::Area, si: 1e-6 };
+    /// Megapascals.
+    pub const MPA: Self = Self { name: "MPa", dimension: Dimension::Pressure, si: 1e6 };
     /// Degrees.
     pub const DEG: Self = Self { name: "deg", dimension: Dimension::Angle, si: DEGREE };
 
@@ -150,6 +162,8 @@ impl Dimension {
             Self::Mass => [0, 1, 0],
             Self::Power => [2, 1, -3],
             Self::Energy => [2, 1, -2],
+            Self::Area => [2, 0, 0],
+            Self::Pressure => [-1, 1, -2],
         }
     }
 

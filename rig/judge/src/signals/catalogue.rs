@@ -10,6 +10,9 @@ use masseter_scenario::{MotionConfig, Scenario, Unit};
 
 use super::signal::{Jaw, JawPoint, NamedSignal, SignalList, estimated};
 use super::timeline::CycleMessages;
+use crate::condyles::Condyles;
+use crate::poses::true_pose;
+use crate::pressure::{PressedTooth, Pressure};
 
 /// The signals of a run of this scenario with this jaw, whose controller declares these.
 pub(super) fn signals(scenario: &Scenario, jaw: Jaw, declared: &Declared) -> Vec<NamedSignal> {
@@ -140,6 +143,33 @@ fn add_contact(list: &mut SignalList, scenario: &Scenario) {
         Some(loads_n(of)?.map(|(_, load_n)| load_n).sum())
     })
     .truth_if(true);
+    for (place, side) in ["left", "right"].into_iter().enumerate() {
+        let condyles = Condyles::new(scenario);
+        let about = format!(
+            "Force on the {side} condyle if both condyles alone held the jaw against teeth, food, weight and inertia: an estimate \
+             without muscles."
+        );
+        list.add(format!("condyle.{side}.load"), Unit::N, about, move |of| {
+            let truths = [of.truth_before.as_ref()?, of.truth.as_ref()?];
+            Some(condyles.as_ref()?.forces_n(truths, of.contact.as_ref())?[place].norm())
+        })
+        .truth_if(true);
+    }
+    let measures: [(&str, Unit, &str, fn(&Pressure) -> f64); 3] = [
+        ("contact_area", Unit::MM2, "Area over which antagonist or food press on", |on| on.area_m2),
+        ("pressure", Unit::MPA, "Mean pressure of antagonist or food on", |on| on.mean_pa),
+        ("pressure_peak", Unit::MPA, "Highest pressure of antagonist or food on", |on| on.peak_pa),
+    ];
+    for tooth in PressedTooth::all(scenario) {
+        for (name, unit, about, measure) in measures {
+            let number = tooth.number;
+            list.add(format!("{name}.{number}"), unit, format!("{about} tooth {number}."), move |of| {
+                let contact = of.contact.as_ref()?.teeth().find(|contact| contact.number == number)?;
+                Some(measure(&tooth.pressure(&contact, &true_pose(of.truth.as_ref()?)?)))
+            })
+            .truth_if(true);
+        }
+    }
 }
 
 /// Where nothing is emulated, the encoders alone show what moves.

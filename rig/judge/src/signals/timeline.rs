@@ -24,6 +24,8 @@ pub struct CycleMessages {
     pub reading: Option<Reading>,
     /// The true motion at the sample.
     pub truth: Option<Truth>,
+    /// That of the cycle before.
+    pub truth_before: Option<Truth>,
     /// The forces between the jaws in the cycle before.
     pub contact: Option<Contact>,
     /// The controller's state in its cycle of this number.
@@ -88,6 +90,7 @@ pub struct Timeline {
     events: Vec<EventRecord>,
     parameters: Option<Parameters>,
     controller_state: Option<u32>,
+    truth: Option<Truth>,
     /// Deadlines that the controller's loop has skipped.
     skipped_cycles: u64,
     /// The motion beside which the run was played.
@@ -208,6 +211,8 @@ impl Timeline {
         messages.parameters = self.parameters;
         self.controller_state = messages.state.map(|state| state.controller_state).or(self.controller_state);
         messages.controller_state = self.controller_state;
+        messages.truth_before = self.truth.filter(|truth| truth.cycle + 1 == messages.cycle);
+        self.truth = messages.truth;
         self.compare_with_motion(&mut messages);
         let controller = messages.state.map(|state| [state.woke_ns, state.worked_ns + state.spun_ns]);
         let plant = messages.reading.map(|reading| [reading.woke_ns, reading.worked_ns + reading.spun_ns]);
