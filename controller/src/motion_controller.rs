@@ -235,6 +235,7 @@ impl Controller for MotionController {
         let desired = self.progress.playback.pose_ahead(-self.sequencer.sample_age_s());
         self.desired = Some(Translation3::from(self.law.detour().at_sample_m) * desired);
         let fault = fault.or_else(|| self.check_start().err());
+        let fault = fault.or_else(|| self.progress.check_lag().err());
         let fault = fault.or_else(|| self.control(desired).err());
         let event = self.sequencer.follow(fault, self.progress.is_over(&self.sequencer), tick);
         if event.is_some() {

@@ -5,9 +5,10 @@
 use std::sync::Arc;
 
 use masseter_model::geometry::{AXES, Mechanism, Pose};
-use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::messages::codes::{Cause, ControllerState};
 use masseter_scenario::{ControllerConfig, MotionConfig, Scenario, TrajectoryLimitsConfig};
 
+use crate::safety::Fault;
 use crate::sequencer::Sequencer;
 use crate::trajectory::{self, Trajectory, TrajectoryReport, interpolate, minimum_jerk};
 
@@ -22,6 +23,8 @@ const LONGEST_S: f64 = 60.0;
 /// A change accelerates and brakes for a third of its time each.
 const SPEED: f64 = 1.5;
 const ACCELERATION: f64 = 4.5;
+/// Time after a cycle that a loop lost in which a wait is no sign of the bus, s.
+const AFTER_LOST_S: f64 = 0.1;
 /// Largest difference of equal times of a motion, s.
 const SAME_TIME_S: f64 = 1e-9;
 /// Largest way of the axes by the share, relative to a proportional way.
@@ -32,6 +35,7 @@ const BEND: f64 = 1.25;
 pub(crate) struct Progress {
     pub(crate) playback: Playback,
     acknowledgement: CommandAcknowledgement,
+    lag: Lag,
     /// Cycles in this state since the desired pose no longer changes.
     cycles_at_rest: u64,
 }
@@ -41,6 +45,7 @@ impl Progress {
         Self {
             playback: Playback::of_scenario(scenario, mechanism, trajectory),
             acknowledgement: CommandAcknowledgement::default(),
+            lag: Lag { limit_s: scenario.checks.motion_lag_ms / 1e3, ..Lag::default() },
             cycles_at_rest: 0,
         }
     }
@@ -49,8 +54,21 @@ impl Progress {
     /// always.
     pub(crate) fn advance(&mut self, sequencer: &Sequencer, cycle: u64) {
         let answered_cycle = sequencer.estimate.map_or(0, |estimate| estimate.answers_cycle);
-        if self.acknowledgement.takes_step(cycle, answered_cycle) {
+        let steps = self.acknowledgement.takes_step(cycle, answered_cycle);
+        if steps {
             self.playback.advance(sequencer.period_s);
+        }
+        let waited_s = if steps { 0.0 } else { sequencer.period_s * self.playback.speed() };
+        self.lag.add(waited_s, sequencer, cycle);
+    }
+
+    /// Whether the motion has waited for no longer than it may.
+    pub(crate) fn check_lag(&self) -> Result<(), Fault> {
+        let Lag { lag_s, limit_s, .. } = self.lag;
+        if lag_s <= limit_s + SAME_TIME_S {
+            Ok(())
+        } else {
+            Err(Fault::new(Cause::MotionLate, lag_s, limit_s))
         }
     }
 
@@ -72,12 +90,34 @@ impl Progress {
             (ControllerState::Holding, _) => self.playback.stop(),
             _ => {}
         }
-        self.cycles_at_rest = 0;
+        (self.cycles_at_rest, self.lag.lag_s) = (0, 0.0);
     }
 
     /// Ends a cycle.
     pub(crate) fn count_rest(&mut self) {
         self.cycles_at_rest = if self.playback.is_at_rest() { self.cycles_at_rest + 1 } else { 0 };
+    }
+}
+
+/// By how much the motion is late, since it waited for lost or late frames. Waits for a loop that lost cycles do not count:
+/// such a loop sends neither readings nor commands.
+#[derive(Debug, Clone, Default)]
+struct Lag {
+    lag_s: f64,
+    limit_s: f64,
+    /// The last cycle without a reading of its own, or after one that the controller lost.
+    gap_cycle: u64,
+}
+
+impl Lag {
+    fn add(&mut self, waited_s: f64, sequencer: &Sequencer, cycle: u64) {
+        if sequencer.heard_cycle != cycle || cycle > sequencer.cycle + 1 {
+            self.gap_cycle = cycle;
+        }
+        let since_gap_s = cycle.saturating_sub(self.gap_cycle) as f64 * sequencer.period_s;
+        if sequencer.state == ControllerState::Running && since_gap_s > AFTER_LOST_S {
+            self.lag_s += waited_s;
+        }
     }
 }
 

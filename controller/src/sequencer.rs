@@ -94,6 +94,8 @@ pub(crate) struct Sequencer {
     pub(crate) cycles_in_state: u64,
     /// The number of the last cycle.
     pub(crate) cycle: u64,
+    /// The cycle of the last reading, complete or not.
+    pub(crate) heard_cycle: u64,
     /// Cycles since the last complete reading.
     pub(crate) silent_cycles: u64,
     /// From the last complete reading.
@@ -116,6 +118,7 @@ impl Sequencer {
             state: WaitReadings,
             cycles_in_state: 0,
             cycle: 0,
+            heard_cycle: 0,
             silent_cycles: 0,
             estimate: None,
             steady_readings: 0,
@@ -127,6 +130,7 @@ impl Sequencer {
 
     /// Takes the reading of a cycle, if there is one.
     pub(crate) fn observe(&mut self, reading: Option<&Reading>) {
+        self.heard_cycle = reading.map_or(self.heard_cycle, |reading| reading.cycle);
         let taken = reading.map_or(Ok(false), |reading| self.apply_reading(reading));
         if taken == Ok(true) {
             self.silent_cycles = 0;

@@ -9,6 +9,7 @@ use masseter_report::why::{Detected, Interval, Left, Why};
 use masseter_runtime::injection::{Injected, Withdrawn};
 use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, status};
+use masseter_virtual_time::Without;
 
 use crate::run::interrupts::Interrupts;
 use crate::vary::why;
@@ -22,16 +23,20 @@ pub(super) struct WhyArgs {
     /// Run folder, its recording.mcap, or a link to either
     #[arg(default_value = "runs/latest")]
     run: PathBuf,
-    /// What is taken away: all, faults, stimuli, or one of them by its place in the scenario, such as faults.2
-    #[arg(long, value_name = "WHAT", default_value = "all", value_parser = withdrawn)]
-    without: Withdrawn,
+    /// What is taken away: all, faults, stimuli, or one of them by its place in the scenario, such as faults.2; or a
+    /// value of the scenario's parameters, such as parameters.motion_rate: the controller's own comes back
+    #[arg(long, value_name = "WHAT", default_value = "all", value_parser = without)]
+    without: Without,
     /// Format of standard output
     #[arg(long, value_enum, default_value_t)]
     format: Format,
 }
 
-fn withdrawn(text: &str) -> anyhow::Result<Withdrawn> {
-    Ok(match text {
+fn without(text: &str) -> anyhow::Result<Without> {
+    if let Some(name) = text.strip_prefix("parameters.") {
+        return Ok(Without::Parameter(name.to_owned()));
+    }
+    Ok(Without::Acting(match text {
         "all" => Withdrawn::All,
         "faults" => Withdrawn::Faults,
         "stimuli" => Withdrawn::Stimuli,
@@ -42,15 +47,16 @@ fn withdrawn(text: &str) -> anyhow::Result<Withdrawn> {
                 "stimulus" => place(number).map(Injected::Stimulus),
                 _ => None,
             });
-            Withdrawn::One(one.context("give all, faults, stimuli, faults.N or stimulus.N, with N from 1")?)
+            let forms = "give all, faults, stimuli, parameters.NAME, faults.N or stimulus.N, with N from 1";
+            Withdrawn::One(one.context(forms)?)
         }
-    })
+    }))
 }
 
 /// Prints why a run failed.
 pub(super) fn why(args: &WhyArgs) -> Result<Exit, Failure> {
     let interrupts = Interrupts::of_verb()?;
-    let why = why::why(&args.run, args.without, &interrupts).usage()?;
+    let why = why::why(&args.run, args.without.clone(), &interrupts).usage()?;
     let text = match args.format {
         Format::Human => in_words(&why),
         Format::Json => serde_json::to_string_pretty(&why).map(|json| json + "\n").context("JSON").usage()?,

@@ -1,4 +1,5 @@
-//! The last way back of a failed run: the last instant from which the run still passes without its faults and stimuli.
+//! The last way back of a failed run: the last instant from which the run still passes without its faults and stimuli, or
+//! with the controller's own value of a parameter.
 //!
 //! The run is played again under virtual time. From the instants of a grid it goes on without them to its end, and is judged.
 //! Where two neighbours differ, their distance is halved down to one cycle. What changes and changes back between two
@@ -24,7 +25,7 @@ use masseter_scenario::Scenario;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use masseter_scenario::wording::counted;
 use masseter_terminal::Exit;
-use masseter_virtual_time::{Branches, Mark, Requests, Run};
+use masseter_virtual_time::{Branches, Mark, Requests, Run, Without};
 
 use crate::run::interrupts::Interrupts;
 use crate::run::request::ControllerKind;
@@ -36,7 +37,7 @@ const LOOKS: u64 = 80;
 const NAMED: usize = 5;
 
 /// Asks why the run of a folder failed: what acted on it is taken away.
-pub(crate) fn why(run: &Path, withdrawn: Withdrawn, interrupts: &Interrupts) -> anyhow::Result<Why> {
+pub(crate) fn why(run: &Path, without: Without, interrupts: &Interrupts) -> anyhow::Result<Why> {
     let folder = RunFolder::open(run)?;
     let manifest = manifest_of(&folder).with_context(|| folder.manifest().display().to_string())?;
     ensure!(
@@ -48,14 +49,26 @@ pub(crate) fn why(run: &Path, withdrawn: Withdrawn, interrupts: &Interrupts) -> 
         format!("the controller '{name}' is none of the rig's, and its state cannot be copied: only 'motion' and 'hold' can go on from an instant")
     })?;
     let scenario = scenario_with_overrides(Some(&folder.scenario()), &Overrides::default())?;
-    check_entries(&scenario, withdrawn)?;
+    check_entries(&scenario, &without)?;
     let plan = resolve_simulated(&scenario, Some(&folder.scenario()), kind.builder())?;
     let digest = digest_of(&folder)?;
-    Question { plan, build: kind.builder(), manifest, withdrawn, interrupts }.answer(&digest)
+    Question { plan, build: kind.builder(), manifest, without, interrupts }.answer(&digest)
 }
 
 /// Refuses to take away what the scenario does not have.
-fn check_entries(scenario: &Scenario, withdrawn: Withdrawn) -> anyhow::Result<()> {
+fn check_entries(scenario: &Scenario, without: &Without) -> anyhow::Result<()> {
+    let withdrawn = match without {
+        Without::Acting(withdrawn) => *withdrawn,
+        Without::Parameter(name) => {
+            let is_set = scenario.parameters.contains_key(name);
+            ensure!(
+                is_set,
+                "the scenario sets no parameter '{name}': --without {} takes nothing away",
+                name_of(without)
+            );
+            return Ok(());
+        }
+    };
     let (faults, stimuli) = (scenario.faults.len(), scenario.stimulus.len());
     let has_it = match withdrawn {
         Withdrawn::All => faults + stimuli > 0,
@@ -68,7 +81,7 @@ fn check_entries(scenario: &Scenario, withdrawn: Withdrawn) -> anyhow::Result<()
     ensure!(
         has_it,
         "the scenario has {faults} and {stimuli}: --without {} takes nothing away",
-        name_of(withdrawn)
+        name_of(without)
     );
     Ok(())
 }
@@ -91,7 +104,7 @@ struct Question<'a> {
     plan: RunPlan,
     build: BuildController,
     manifest: Manifest,
-    withdrawn: Withdrawn,
+    without: Without,
     interrupts: &'a Interrupts,
 }
 
@@ -99,7 +112,7 @@ impl Question<'_> {
     fn answer(mut self, digest: &str) -> anyhow::Result<Why> {
         let mut branches = Branches::new(&self.plan, self.build)?;
         let start = branches.mark()?;
-        let (verdict, figures) = self.end(&mut branches, None)?;
+        let (verdict, figures) = self.end(&mut branches, true)?;
         ensure!(
             figures.digest == digest,
             "played again, the run has other messages than its recording: another build has made it, messages are missing, or \
@@ -115,7 +128,11 @@ impl Question<'_> {
         let mut scan = Scan { question: self, branches, check, marks: vec![start], looks: Vec::new() };
         let acts =
             |event: &&EventRecord| event.cause == Cause::FaultInjected || event.cause == Cause::StimulusBegan;
-        let first = figures.events.iter().find(acts).map_or(1, |event| event.cycle);
+        // A parameter acts from the start.
+        let first = match scan.question.without {
+            Without::Acting(_) => figures.events.iter().find(acts).map_or(1, |event| event.cycle),
+            Without::Parameter(_) => 1,
+        };
         scan.visit(0)?;
         ensure!(
             scan.looks[0].passes,
@@ -133,7 +150,7 @@ impl Question<'_> {
         let detection =
             figures.events.iter().find(|event| event.kind == EventKind::Fault && event.cycle > last);
         Ok(Why {
-            without: name_of(question.withdrawn),
+            without: name_of(&question.without),
             verdict: format!("{}: {}", verdict.word, verdict.reason),
             check,
             margin_unit,
@@ -149,13 +166,10 @@ impl Question<'_> {
         })
     }
 
-    /// Plays to the end, without what is withdrawn, and judges.
-    fn end(
-        &mut self,
-        branches: &mut Branches,
-        withdrawn: Option<Withdrawn>,
-    ) -> anyhow::Result<(Verdict, Figures)> {
-        let figures = branches.end(withdrawn, &mut self.manifest, self.interrupts)?;
+    /// Plays to the end, with what is taken away or without, and judges.
+    fn end(&mut self, branches: &mut Branches, with_all: bool) -> anyhow::Result<(Verdict, Figures)> {
+        let without = (!with_all).then_some(&self.without);
+        let figures = branches.end(without, &mut self.manifest, self.interrupts)?;
         ensure!(!self.interrupts.is_stop_requested(), "interrupted");
         Ok((Verdict::new(&self.manifest, &figures), figures))
     }
@@ -163,7 +177,7 @@ impl Question<'_> {
     /// The signals that leave their nominal values first after that instant.
     fn compare(&self, last: u64, declared: &Declared) -> anyhow::Result<Vec<Left>> {
         let (mut nominal, mut found) = (self.watched(last, declared)?, self.watched(last, declared)?);
-        nominal.run.withdraw(self.withdrawn);
+        nominal.run.go_without(&self.without)?;
         while !found.run.has_ended() && !nominal.run.has_ended() {
             nominal.run.play_cycle()?;
             found.run.play_cycle()?;
@@ -220,12 +234,13 @@ impl Watched {
 }
 
 /// What is taken away.
-fn name_of(withdrawn: Withdrawn) -> String {
-    match withdrawn {
-        Withdrawn::All => "faults and stimuli".to_owned(),
-        Withdrawn::Faults => "faults".to_owned(),
-        Withdrawn::Stimuli => "stimuli".to_owned(),
-        Withdrawn::One(one) => one.to_string(),
+fn name_of(without: &Without) -> String {
+    match without {
+        Without::Acting(Withdrawn::All) => "faults and stimuli".to_owned(),
+        Without::Acting(Withdrawn::Faults) => "faults".to_owned(),
+        Without::Acting(Withdrawn::Stimuli) => "stimuli".to_owned(),
+        Without::Acting(Withdrawn::One(one)) => one.to_string(),
+        Without::Parameter(name) => format!("parameters.{name}"),
     }
 }
 
@@ -303,7 +318,7 @@ impl Scan<'_> {
 
     /// What the run comes to from that instant, where it is.
     fn look(&mut self, mark: &Mark) -> anyhow::Result<Look> {
-        let (verdict, _) = self.question.end(&mut self.branches, Some(self.question.withdrawn))?;
+        let (verdict, _) = self.question.end(&mut self.branches, false)?;
         let check = verdict.checks.iter().find(|check| Some(&*check.name) == self.check.as_deref());
         let margin = check.and_then(|check| check.figures.as_ref()?.margin);
         Ok(Look { cycle: mark.cycle, passes: passes(&verdict), margin })

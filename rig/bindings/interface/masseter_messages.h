@@ -199,6 +199,8 @@ enum masseter_cause {
     MASSETER_CAUSE_END_STOP_HIT = 62,
     /* A drive acknowledged a value and shows another one (value that it shows; the limit is the one written). */
     MASSETER_CAUSE_NOT_KEPT = 63,
+    /* The motion waited too long for lost or late commands and readings (s). */
+    MASSETER_CAUSE_MOTION_LATE = 65,
 };
 
 enum masseter_no_pose {
@@ -219,7 +221,7 @@ enum masseter_no_pose {
 };
 
 #define MASSETER_READING_TOPIC "reading"
-#define MASSETER_READING_TYPE_NAME "masseter/Reading/77fbf2563d374143"
+#define MASSETER_READING_TYPE_NAME "masseter/Reading/9d8ad5ebfa25365a"
 
 /* Positions, forces and states of the drives, once a cycle. */
 typedef struct masseter_reading {
@@ -294,7 +296,7 @@ static_assert(offsetof(masseter_reading, fresh_axes) == 256, "offset of fresh_ax
 static_assert(offsetof(masseter_reading, master_fault) == 260, "offset of master_fault");
 
 #define MASSETER_COMMAND_TOPIC "command"
-#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/122499e7837b8623"
+#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/aa9ccbb5a914f2fa"
 
 /* Targets and request for the drives, once a cycle. */
 typedef struct masseter_command {
@@ -330,7 +332,7 @@ static_assert(offsetof(masseter_command, request) == 136, "offset of request");
 static_assert(offsetof(masseter_command, controller_state) == 140, "offset of controller_state");
 
 #define MASSETER_STATE_TOPIC "state"
-#define MASSETER_STATE_TYPE_NAME "masseter/State/222f0a2c6bd98281"
+#define MASSETER_STATE_TYPE_NAME "masseter/State/d4676753f03c0750"
 
 /* The controller's state and its estimate, once a cycle. All float64 fields but `motion_time_s` have 31 significant bits. */
 typedef struct masseter_state {
@@ -417,7 +419,7 @@ static_assert(offsetof(masseter_state, iterations) == 288, "offset of iterations
 static_assert(offsetof(masseter_state, controller_state) == 292, "offset of controller_state");
 
 #define MASSETER_EVENT_TOPIC "event"
-#define MASSETER_EVENT_TYPE_NAME "masseter/Event/ddd3c1af3d2bd72a"
+#define MASSETER_EVENT_TYPE_NAME "masseter/Event/74061a7c3e4137f5"
 
 /* A single occurrence: a change of state, a fault, an alarm. */
 typedef struct masseter_event {
@@ -474,7 +476,7 @@ static_assert(offsetof(masseter_event, value) == 72, "offset of value");
 static_assert(offsetof(masseter_event, limit) == 80, "offset of limit");
 
 #define MASSETER_TRUTH_TOPIC "truth"
-#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/ef615c1cdf89a4ab"
+#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/fa288e2ecf0cfeb2"
 
 /* The true state of the mechanism, once a cycle; the controller never reads it. All float64 fields have 31 significant bits. */
 typedef struct masseter_truth {
@@ -522,7 +524,7 @@ static_assert(offsetof(masseter_truth, bite_force_n) == 288, "offset of bite_for
 static_assert(offsetof(masseter_truth, bite_force_sample_n) == 296, "offset of bite_force_sample_n");
 
 #define MASSETER_CONTACT_TOPIC "contact"
-#define MASSETER_CONTACT_TYPE_NAME "masseter/Contact/f45400510a8a2978"
+#define MASSETER_CONTACT_TYPE_NAME "masseter/Contact/0b914d25db656913"
 
 /* The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads it. All float64 fields have 31 significant bits. */
 typedef struct masseter_contact {

@@ -194,10 +194,10 @@ impl NextStep {
             AccelerationLimit, BadMessage, BootTimeout, BusOff, BusRefused, CommandLost, DriveFault,
             DuplicateNode, Emergency, EnableTimeout, EndStopHit, FaultAtStart, FaultFound, FollowingError,
             ForeignCommand, ForwardKinematics, HeartbeatLost, HomeOffset, InverseKinematics, LawFailed,
-            NodeRestarted, NodeStopped, NotAccepted, NotEnabled, NotKept, NotReady, OrientationLost,
-            ProcessDataLost, SdoAborted, SdoTimeout, SecondMaster, StaleReading, StartTooFar, StillPowered,
-            StrokeLimit, TrackingLost, UnknownNode, VelocityLimit, WrongIdentity, WrongLength, WrongObject,
-            WrongPdo, WrongUnit,
+            MotionLate, NodeRestarted, NodeStopped, NotAccepted, NotEnabled, NotKept, NotReady,
+            OrientationLost, ProcessDataLost, SdoAborted, SdoTimeout, SecondMaster, StaleReading,
+            StartTooFar, StillPowered, StrokeLimit, TrackingLost, UnknownNode, VelocityLimit, WrongIdentity,
+            WrongLength, WrongObject, WrongPdo, WrongUnit,
         };
         if figures.declared_cause().is_some() {
             return Self::DeclaredFault;
@@ -214,7 +214,7 @@ impl NextStep {
             | NotKept => Self::Configuration,
             StrokeLimit | VelocityLimit | AccelerationLimit | EndStopHit => Self::Limit,
             TrackingLost | OrientationLost | FollowingError => Self::OffPath,
-            StaleReading | CommandLost => Self::Stale,
+            StaleReading | CommandLost | MotionLate => Self::Stale,
             LawFailed | BadMessage | ForeignCommand if is_of_program => Self::ProgramLaw,
             LawFailed | BadMessage | ForeignCommand => Self::Law,
             ForwardKinematics | InverseKinematics => Self::Pose,

@@ -30,13 +30,14 @@ fn scenario(text: &str) -> Scenario {
     Scenario::parse("planted.toml".as_ref(), &format!("{HEAD}{text}{TIGHT}")).unwrap()
 }
 
-fn ask(scenario: &Scenario, withdrawn: Withdrawn) -> anyhow::Result<Why> {
+fn ask(scenario: &Scenario, without: impl Into<Without>) -> anyhow::Result<Why> {
     let digest = played(scenario).figures.digest;
     let build = ControllerKind::Motion.builder();
     let plan = resolve_simulated(scenario, None, build)?;
     let machine = MachineInfo { cpu: "any".into(), cores: 2, kernel: "Linux".into(), is_virtual: true };
     let manifest = Manifest::new("test", scenario.clone(), plan.trajectory.duration_s(), "virtual", machine);
-    Question { plan, build, manifest, withdrawn, interrupts: &Interrupts::default() }.answer(&digest)
+    let without = without.into();
+    Question { plan, build, manifest, without, interrupts: &Interrupts::default() }.answer(&digest)
 }
 
 fn played(scenario: &Scenario) -> Judged {
@@ -72,6 +73,18 @@ fn check(planted: &[&str]) {
         assert!(found_ms == 800 + passing, "{text}: {found_ms} instead of {}", 800 + passing);
         assert!(!why.left_first.is_empty() && why.left_first[0].cycle > why.last_way_back.cycle, "{text}");
     }
+}
+
+/// Half the motion opens the jaw by 9 mm, and the whole one by 18 mm.
+#[test]
+fn a_parameter_is_taken_away_by_the_controllers_own_value() {
+    let text = "[parameters]\nmotion_amplitude = 0.5\n";
+    let small = "[[require]]\nname = 'wide'\nsignal = 'jaw.opening'\nstatistic = 'peak_to_peak'\nduring = 'running'\nmin = '10 mm'\n";
+    let scenario = Scenario::parse("planted.toml".as_ref(), &format!("{HEAD}{text}{small}")).unwrap();
+    let why = ask(&scenario, Without::Parameter("motion_amplitude".to_owned())).unwrap();
+    assert!(why.last_way_back.cycle > 1 && why.without == "parameters.motion_amplitude", "{why:?}");
+    let unknown = ask(&scenario, Without::Parameter("gain".to_owned())).unwrap_err().to_string();
+    assert!(unknown.contains("'gain'"), "{unknown}");
 }
 
 #[test]

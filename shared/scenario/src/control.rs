@@ -238,6 +238,7 @@ section! {
         /// Largest such angle; no declared fault may turn the platform further before it is detected.
         pub tracking_max_deg: f64 = 0.5 => Positive,
         /// By how much the motion may be late, since commands or readings were lost; the desired pose is late by no more.
+        /// Beyond it the rig's controller stops.
         pub motion_lag_ms: f64 = 20.0 => Within(0.0, 1000.0),
         /// Largest way of an axis after a stop, from where it was when its drive lost power.
         pub standstill_axis_mm: f64 = 0.5 => Positive,

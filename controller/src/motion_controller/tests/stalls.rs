@@ -58,3 +58,35 @@ fn a_stall_is_not_taken_for_lost_tracking() {
         assert!(bench.events.iter().all(|event| event.kind == EventKind::Transition.code()));
     }
 }
+
+/// Of fourteen readings four are incomplete, for which the motion waits three cycles.
+#[test]
+fn a_motion_that_waited_too_long_in_all_for_the_bus_is_late() {
+    let mut bench = Bench::new();
+    bench.run_until(ControllerState::Running);
+    (0..150).for_each(|_| bench.cycle(Some));
+    for round in 1..=7 {
+        assert_eq!(bench.controller.state(), ControllerState::Running, "round {round}");
+        (0..10).for_each(|_| bench.cycle(Some));
+        (0..4).for_each(|_| bench.cycle(|reading| Some(Reading { fresh_axes: 0, ..reading })));
+    }
+    assert_eq!(
+        (bench.controller.state(), bench.last_cause()),
+        (ControllerState::SafeStop, Cause::MotionLate)
+    );
+    let told = bench.events.last().unwrap();
+    assert!((told.value - 0.021).abs() < 1e-9 && (told.limit - 0.02).abs() < 1e-9, "{told:?}");
+}
+
+#[test]
+fn waits_for_a_loop_that_stands_still_do_not_make_the_motion_late() {
+    for stall in [Bench::controller_stalls, Bench::plant_stalls] {
+        let mut bench = Bench::new();
+        bench.run_until(ControllerState::Running);
+        for _ in 0..6 {
+            (0..40).for_each(|_| bench.cycle(Some));
+            stall(&mut bench, 15);
+        }
+        assert_eq!(bench.controller.state(), ControllerState::Running);
+    }
+}

@@ -12,6 +12,7 @@ pub(crate) mod parameters;
 mod power;
 mod servo;
 
+use masseter_can::canopen::EmergencyCode;
 use masseter_can::cia402::{Controlword, DriveState, StateCommand, StatusBit, Statusword};
 
 use crate::dictionary::Objects;
@@ -281,14 +282,14 @@ impl Axis {
         force_n
     }
 
-    /// A step of the servo loops with the shaft at a position. Returns the force until the next step, N, and whether
-    /// the following error has become a fault. `look` gives the encoder's output at its own position.
+    /// A step of the servo loops with the shaft at a position. Returns the force until the next step, N, and the error
+    /// that has become a fault. `look` gives the encoder's output at its own position.
     pub(super) fn step(
         &mut self,
         now_ns: u64,
         position_m: f64,
         look: &mut dyn FnMut(f64) -> Look,
-    ) -> (f64, bool) {
+    ) -> (f64, Option<EmergencyCode>) {
         self.complete_transition(now_ns);
         if let Some(state) = self.power.without_torque(&mut self.faults) {
             self.enter(state, now_ns);
@@ -309,11 +310,19 @@ impl Axis {
             self.execute(command, now_ns);
         }
         let places_m = [self.coordinates.counted_m(), seen_m - position_m];
+        let has_jumped = self.supervise_encoder(now_ns);
         let command = self.servo_command(now_ns);
         let limits = self.servo_limits(command);
         let force_n = self.drivetrain.step(now_ns, places_m, command, &limits, &mut self.faults);
         self.shown_n = self.drivetrain.motor_n.value;
-        (force_n, self.supervise_following(now_ns, command))
+        let error = if has_jumped {
+            Some(EmergencyCode::POSITION_SENSOR)
+        } else if self.supervise_stop(now_ns, command) {
+            Some(EmergencyCode::VELOCITY)
+        } else {
+            self.supervise_following(now_ns, command).then_some(EmergencyCode::FOLLOWING_ERROR)
+        };
+        (force_n, error)
     }
 
     /// The command of the loops, with the velocity offset of cyclic synchronous position.
@@ -472,6 +481,34 @@ impl Axis {
         }
     }
 
+    /// Judges the last count of an axis under torque; returns whether a jump has become a fault. The reaction is the brake:
+    /// no loop shall follow the jump.
+    fn supervise_encoder(&mut self, now_ns: u64) -> bool {
+        let jumps =
+            self.demand != Demand::Brake && self.drivetrain.servo.is_jump(self.coordinates.counted_m());
+        if jumps {
+            self.enter(DriveState::Fault, now_ns);
+        }
+        jumps
+    }
+
+    /// Judges the velocity of an axis that stops; returns whether its distance from the ramp is a new fault. The
+    /// reaction is the brake: a loop that leaves its ramp closes over a wrong position, or lacks the force (IEC 61800-5-2,
+    /// SS1-r).
+    fn supervise_stop(&mut self, now_ns: u64, command: ServoCommand) -> bool {
+        let is_stopping = self.power.leaves_for.is_some()
+            || matches!(self.power.state, DriveState::QuickStopActive | DriveState::FaultReactionActive);
+        let ServoCommand::Follow(ramp) = command else { return false };
+        let servo = &self.drivetrain.servo;
+        let apart_m_s = (servo.motion.velocity_m_s - ramp.velocity_m_s).abs();
+        let runs_away = is_stopping && apart_m_s > servo.runaway_m_s();
+        let is_new = runs_away && !self.power.is_in_fault();
+        if runs_away {
+            self.enter(DriveState::Fault, now_ns);
+        }
+        is_new
+    }
+
     /// Judges the error of the servo from its demanded position.
     fn supervise_following(&mut self, now_ns: u64, command: ServoCommand) -> bool {
         let Some(window_m) = self.parameters.following_window_m else { return false };
@@ -538,7 +575,8 @@ impl Axis {
     }
 
     fn slow_down(&mut self, now_ns: u64, deceleration_m_s2: f64) {
-        self.demand.slow_down(now_ns, self.drivetrain.servo.motion, deceleration_m_s2);
+        let servo = &self.drivetrain.servo;
+        self.demand.slow_down(now_ns, servo.motion, deceleration_m_s2, servo.runaway_m_s());
     }
 
     /// The software position limits, which have no meaning before the homing of an incremental encoder.

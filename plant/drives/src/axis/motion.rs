@@ -302,15 +302,28 @@ impl Demand {
         is_limited
     }
 
-    /// Slows down from the demanded position (the actual position where none is demanded) and the actual velocity. The demanded
-    /// velocity is no guide: at SYNC, the time of the command, it is zero at the end of a line. A closed brake stays
-    /// closed.
-    pub(super) fn slow_down(&mut self, now_ns: u64, actual: Motion, deceleration_m_s2: f64) {
-        if *self != Self::Brake {
-            let position_m = self.position_m(now_ns).unwrap_or(actual.position_m);
-            let start = Motion { position_m, ..actual };
-            *self = Self::Profile(Profile::stop(now_ns, start, deceleration_m_s2));
-        }
+    /// Slows down from the demanded position (the actual position where none is demanded) and the actual velocity, but not from a
+    /// velocity farther than `most_apart_m_s` from all that was demanded: an encoder that jumps shows such a one. The
+    /// demanded velocity alone is no guide: at SYNC, the time of the command, it is zero at the end of a line. A closed
+    /// brake stays closed.
+    pub(super) fn slow_down(
+        &mut self,
+        now_ns: u64,
+        actual: Motion,
+        deceleration_m_s2: f64,
+        most_apart_m_s: f64,
+    ) {
+        let demanded_m_s = match self {
+            Self::Brake => return,
+            Self::Speed(_) | Self::Force(_) => actual.velocity_m_s,
+            Self::Interpolate { from_m, to_m, period_s, .. } => (*to_m - *from_m) / *period_s,
+            Self::Profile(profile) => profile.at(now_ns).velocity_m_s,
+        };
+        let [low_m_s, high_m_s] = [demanded_m_s.min(0.0), demanded_m_s.max(0.0)];
+        let (velocity_m_s, _) =
+            clamp(actual.velocity_m_s, [low_m_s - most_apart_m_s, high_m_s + most_apart_m_s]);
+        let position_m = self.position_m(now_ns).unwrap_or(actual.position_m);
+        *self = Self::Profile(Profile::stop(now_ns, Motion { position_m, velocity_m_s }, deceleration_m_s2));
     }
 
     /// Whether the demand is no motion.
@@ -477,11 +490,23 @@ mod demand_tests {
     fn it_slows_down_evenly_and_stays() {
         let mut demand = Demand::Brake;
         approach(&mut demand, 0, 0.2702);
-        demand.slow_down(MS, Motion { position_m: 0.27, velocity_m_s: 0.2 }, 10.0);
+        demand.slow_down(MS, Motion { position_m: 0.27, velocity_m_s: 0.2 }, 10.0, 0.1);
         // 0.2 m/s at 10 m/s²: 20 ms and 2 mm.
         assert!(!demand.is_at_rest(MS + 19 * MS));
         assert!(demand.is_at_rest(MS + 21 * MS));
         assert!((demand.position_m(100 * MS).unwrap() - 0.2722).abs() < 1e-9);
+    }
+
+    /// A line at 0.2 m/s, or rest; an encoder that jumps shows 8 m/s.
+    #[test]
+    fn it_slows_down_from_no_velocity_that_nothing_asked_for() {
+        for (velocity_m_s, expected_m_s) in [(0.29, 0.29), (8.0, 0.3), (-0.09, -0.09), (-8.0, -0.1)] {
+            let mut demand = Demand::Brake;
+            approach(&mut demand, 0, 0.2702);
+            demand.slow_down(MS, Motion { position_m: 0.27, velocity_m_s }, 10.0, 0.1);
+            let begin_m_s = demand.at(MS).unwrap().velocity_m_s;
+            assert!((begin_m_s - expected_m_s).abs() < 1e-9, "{velocity_m_s}: {begin_m_s}");
+        }
     }
 
     #[test]
@@ -500,7 +525,7 @@ mod demand_tests {
     fn from_a_force_it_slows_down_where_the_axis_is() {
         let mut demand = Demand::Force(Ramp::at_once(20.0));
         assert_eq!(demand.servo_command(0), ServoCommand::Force { force_n: 20.0 });
-        demand.slow_down(0, Motion { position_m: 0.28, velocity_m_s: 0.1 }, 10.0);
+        demand.slow_down(0, Motion { position_m: 0.28, velocity_m_s: 0.1 }, 10.0, 0.1);
         assert!((demand.position_m(100 * MS).unwrap() - 0.2805).abs() < 1e-9);
     }
 
@@ -524,7 +549,7 @@ mod demand_tests {
         assert!(!Demand::Force(Ramp::at_once(1.0)).is_at_rest(20 * MS));
         let mut demand = Demand::Brake;
         assert_eq!(demand.servo_command(20 * MS), ServoCommand::Brake);
-        demand.slow_down(20 * MS, Motion { position_m: 0.27, velocity_m_s: 0.1 }, 10.0);
+        demand.slow_down(20 * MS, Motion { position_m: 0.27, velocity_m_s: 0.1 }, 10.0, 0.1);
         assert_eq!(demand.servo_command(21 * MS), ServoCommand::Brake, "a closed brake stays closed");
     }
 }

@@ -9,6 +9,10 @@ use crate::ratings::Ratings;
 
 /// Time constant of the filter on the measured velocity, s.
 const VELOCITY_FILTER_S: f64 = 5e-4;
+/// Largest distance of a stopping axis' velocity from its ramp, as a share of the drive's velocity.
+const RUNAWAY_SHARE: f64 = 0.25;
+/// Largest way of a measured position in a step, in ways at the drive's velocity.
+const MOST_WAYS: f64 = 10.0;
 /// Stiffness of the closed brake, N/m, and its damping, N per m/s.
 pub(super) const BRAKE_STIFFNESS_N_M: f64 = 2e5;
 pub(super) const BRAKE_DAMPING_N_S_M: f64 = 400.0;
@@ -81,6 +85,17 @@ impl Servo {
             ServoCommand::Speed { velocity_m_s } => self.keep_speed(velocity_m_s, limits),
             ServoCommand::Force { force_n } => self.push(force_n, limits),
         }
+    }
+
+    /// Largest distance of a stopping axis' velocity from its ramp, m/s.
+    pub(super) fn runaway_m_s(&self) -> f64 {
+        RUNAWAY_SHARE * self.config.max_velocity_m_s
+    }
+
+    /// Whether a measured position is farther from the last one than any axis comes in a step.
+    pub(super) fn is_jump(&self, measured_m: f64) -> bool {
+        let way_m = (measured_m - self.motion.position_m).abs();
+        way_m > MOST_WAYS * self.config.max_velocity_m_s * self.step_s
     }
 
     /// A motion after a step to a position, with its velocity filtered.

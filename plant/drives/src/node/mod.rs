@@ -247,9 +247,9 @@ impl DriveNode {
         if let Some(response) = self.sdo.step(now_ns) {
             self.respond(response);
         }
-        let (force_n, has_following_error) = self.axis.step(now_ns, position_m, look);
-        if has_following_error {
-            self.raise(EmergencyCode::FOLLOWING_ERROR);
+        let (force_n, error) = self.axis.step(now_ns, position_m, look);
+        if let Some(error) = error {
+            self.raise(error);
         }
         if !self.axis.faults.is_empty() {
             self.fail_as_injected(now_ns);

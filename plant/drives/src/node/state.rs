@@ -158,12 +158,18 @@ const VOLTAGE: u8 = 0x04;
 const TEMPERATURE: u8 = 0x08;
 
 /// The number of errors that the drive can report: room for each of them once.
-const COUNT: usize = 11;
+const COUNT: usize = 12;
 
 /// The errors that put the drive into fault and last until a reset. These are a following error beyond window and time
-/// out, a loss of control (6007h), and a logic supply that is too low.
-const FAULTS: [EmergencyCode; 3] =
-    [EmergencyCode::FOLLOWING_ERROR, EmergencyCode::COMMUNICATION, EmergencyCode::LOGIC_SUPPLY];
+/// out, an encoder that jumps or contradicts another one, a stop that leaves its ramp, a loss of control (6007h), and a
+/// logic supply that is too low.
+const FAULTS: [EmergencyCode; 5] = [
+    EmergencyCode::FOLLOWING_ERROR,
+    EmergencyCode::POSITION_SENSOR,
+    EmergencyCode::VELOCITY,
+    EmergencyCode::COMMUNICATION,
+    EmergencyCode::LOGIC_SUPPLY,
+];
 
 /// The present errors, the newest first.
 #[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
@@ -225,7 +231,7 @@ impl Errors {
 fn register_bits(error: EmergencyCode) -> u8 {
     GENERIC
         | match error {
-            EmergencyCode::FOLLOWING_ERROR => PROFILE,
+            EmergencyCode::FOLLOWING_ERROR | EmergencyCode::VELOCITY => PROFILE,
             EmergencyCode(0x2000..0x3000) => CURRENT,
             EmergencyCode(0x3000..0x4000) | EmergencyCode::LOGIC_SUPPLY => VOLTAGE,
             EmergencyCode(0x4000..0x5000) => TEMPERATURE,

@@ -110,3 +110,39 @@ fn a_controlword_during_a_fault_reaction_clears_nothing() {
     }
     assert_eq!(bench.emergencies(), [EmergencyCode::COMMUNICATION]);
 }
+
+/// An axis makes 50 µm in a step at its highest velocity.
+#[test]
+fn an_encoder_that_jumps_gets_the_brake_instead_of_a_loop() {
+    for (jump_m, is_fault) in [(0.4e-3, false), (0.6e-3, true), (-5e-3, true)] {
+        let (mut bench, target) = Bench::cycling();
+        bench.offset_m = jump_m;
+        bench.cycle(0x0F, target);
+        let (state, told) = match is_fault {
+            true => (DriveState::Fault, vec![EmergencyCode::POSITION_SENSOR]),
+            false => (DriveState::OperationEnabled, Vec::new()),
+        };
+        assert_eq!((bench.drive.state(), bench.emergencies()), (state, told), "{jump_m} m");
+    }
+}
+
+/// From 0.1 m/s the ramp takes 10 ms and 0.5 mm. A loop of the wrong sign would push with the whole force in that time.
+#[test]
+fn a_stop_that_leaves_its_ramp_ends_in_the_brake() {
+    for is_turned in [false, true] {
+        let (mut bench, target) = Bench::cycling();
+        let from_m = bench.position_m;
+        bench.turned_at_m = is_turned.then_some(from_m);
+        bench.cycle(0x02, target);
+        bench.run_ms(50);
+        let stopped_m = bench.position_m;
+        bench.run_ms(50);
+        assert!((bench.position_m - stopped_m).abs() < 1e-6, "it stands");
+        assert!((stopped_m - from_m).abs() < 1e-3, "{} m", stopped_m - from_m);
+        let (state, told) = match is_turned {
+            true => (DriveState::Fault, vec![EmergencyCode::VELOCITY]),
+            false => (DriveState::SwitchOnDisabled, Vec::new()),
+        };
+        assert_eq!((bench.drive.state(), bench.emergencies()), (state, told));
+    }
+}

@@ -44,6 +44,10 @@ pub(crate) struct Bench {
     pub(crate) velocity_m_s: f64,
     pub(crate) force_n: f64,
     pub(crate) load_n: f64,
+    /// By how much the encoder shows too much.
+    pub(crate) offset_m: f64,
+    /// Where the encoder began to count the other way.
+    pub(crate) turned_at_m: Option<f64>,
     /// Hard stops of the axis.
     pub(crate) stops_m: [f64; 2],
     pub(crate) sent: Vec<Frame>,
@@ -82,6 +86,8 @@ impl Bench {
             velocity_m_s: 0.0,
             force_n: 0.0,
             load_n: LOAD_N,
+            offset_m: 0.0,
+            turned_at_m: None,
             stops_m: [f64::NEG_INFINITY, f64::INFINITY],
             sent: Vec::new(),
         }
@@ -123,7 +129,10 @@ impl Bench {
             self.velocity_m_s += (self.force_n - self.load_n + stopped_n - damped_n) / MASS_KG * step_s;
             self.position_m += self.velocity_m_s * step_s;
             self.now_ns += STEP_NS;
-            self.force_n = self.drive.step(self.now_ns, self.position_m, Look::exact);
+            let (offset_m, turned_at_m) = (self.offset_m, self.turned_at_m);
+            let look =
+                |at_m: f64| Look::exact(offset_m + turned_at_m.map_or(at_m, |from_m| 2.0 * from_m - at_m));
+            self.force_n = self.drive.step(self.now_ns, self.position_m, look);
             self.collect();
         }
     }

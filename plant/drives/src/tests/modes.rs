@@ -146,7 +146,7 @@ fn a_window_left_for_less_than_its_time_out_is_no_following_error() {
 fn without_a_window_no_following_error_is_seen() {
     let (mut bench, _) = Bench::cycling();
     bench.write((0x6065, 0), &u32::MAX.to_le_bytes()).unwrap();
-    bench.load_n = 2000.0;
+    bench.load_n = 1020.0;
     bench.run_ms(60);
     assert_eq!(bench.drive.state(), DriveState::OperationEnabled);
 }

@@ -206,6 +206,8 @@ class Cause(enum.IntEnum):
     END_STOP_HIT = 62
     #: A drive acknowledged a value and shows another one (value that it shows; the limit is the one written).
     NOT_KEPT = 63
+    #: The motion waited too long for lost or late commands and readings (s).
+    MOTION_LATE = 65
 
 
 class NoPose(enum.IntEnum):
@@ -278,7 +280,7 @@ class Reading(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Reading/77fbf2563d374143"
+        return "masseter/Reading/9d8ad5ebfa25365a"
 
 
 _check(Reading, 264, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 176, 224, 232, 256, 260])
@@ -311,7 +313,7 @@ class Command(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Command/122499e7837b8623"
+        return "masseter/Command/aa9ccbb5a914f2fa"
 
 
 _check(Command, 144, [0, 8, 16, 24, 32, 40, 88, 136, 140])
@@ -378,7 +380,7 @@ class State(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/State/222f0a2c6bd98281"
+        return "masseter/State/d4676753f03c0750"
 
 
 _check(State, 296, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 136, 160, 192, 216, 248, 272, 280, 288, 292])
@@ -425,7 +427,7 @@ class Event(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Event/ddd3c1af3d2bd72a"
+        return "masseter/Event/74061a7c3e4137f5"
 
 
 _check(Event, 88, [0, 8, 16, 24, 32, 40, 44, 48, 52, 56, 60, 62, 64, 68, 72, 80])
@@ -466,7 +468,7 @@ class Truth(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Truth/ef615c1cdf89a4ab"
+        return "masseter/Truth/fa288e2ecf0cfeb2"
 
 
 _check(Truth, 304, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240, 288, 296])
@@ -497,7 +499,7 @@ class Contact(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Contact/f45400510a8a2978"
+        return "masseter/Contact/0b914d25db656913"
 
 
 _check(Contact, 872, [0, 8, 16, 24, 32, 40, 104, 488])

@@ -8,12 +8,11 @@ use masseter_plan::RunPlan;
 use masseter_plant::PlantError;
 use masseter_recording::Manifest;
 use masseter_runtime::control::NoBranch;
-use masseter_runtime::injection::Withdrawn;
 use masseter_runtime::messages::tap::TapError;
-use masseter_runtime::named::Declared;
+use masseter_runtime::named::{Declared, NameError};
 
 use crate::log::Stream;
-use crate::run::{Control, Requests, RestoreError, Run, RunSnapshot, built};
+use crate::run::{Control, Requests, RestoreError, Run, RunSnapshot, Without, built};
 
 /// Why a branch cannot be played.
 #[derive(Debug, thiserror::Error)]
@@ -27,6 +26,9 @@ pub enum BranchError {
     /// The run cannot go back.
     #[error(transparent)]
     Restore(#[from] RestoreError),
+    /// The controller has no such parameter.
+    #[error(transparent)]
+    Name(#[from] NameError),
     /// A message of the topic 'frame' is no CAN frame.
     #[error(transparent)]
     Tap(#[from] TapError),
@@ -93,18 +95,18 @@ impl Branches {
         Ok(())
     }
 
-    /// Plays from here to the end, without what is withdrawn, and stays there. Enters the ending into the manifest.
+    /// Plays from here to the end, without this, and stays there. Enters the ending into the manifest.
     ///
     /// # Errors
-    /// When a message of the topic `frame` holds no CAN frame.
+    /// [`NameError`] for a parameter that the controller does not have. When a message of the topic `frame` holds no CAN frame.
     pub fn end(
         &mut self,
-        withdrawn: Option<Withdrawn>,
+        without: Option<&Without>,
         manifest: &mut Manifest,
         interrupts: &dyn Requests,
     ) -> Result<Figures, BranchError> {
-        if let Some(withdrawn) = withdrawn {
-            self.run.withdraw(withdrawn);
+        if let Some(without) = without {
+            self.run.go_without(without)?;
         }
         manifest.declared.clone_from(&self.declared);
         manifest.ending = self.run.play(interrupts);

@@ -26,7 +26,7 @@ use run::{Control, built};
 pub use branches::{BranchError, Branches, Mark};
 pub use log::{Log, LoggedPorts, Sink};
 pub use rig::{Rig, RigError};
-pub use run::{Requests, RestoreError, Run, RunSnapshot, Uninterrupted};
+pub use run::{Requests, RestoreError, Run, RunSnapshot, Uninterrupted, Without};
 pub use snapshot::{OtherScenario, Snapshot, SnapshotError, SnapshotProblem};
 
 /// Makes the analysis of a run: with everything that a report shows, or with what a verdict needs alone.

@@ -14,7 +14,7 @@ use masseter_runtime::injection::{Operator, Withdrawn};
 use masseter_runtime::lifecycle::Party;
 use masseter_runtime::lockstep::EPOCH_NS;
 use masseter_runtime::messages::Command;
-use masseter_runtime::named::{Declared, NamedValues};
+use masseter_runtime::named::{Declared, NameError, NamedValues};
 use masseter_scenario::Scenario;
 
 use crate::log::Sink;
@@ -39,6 +39,21 @@ pub trait Requests {
 pub struct Uninterrupted;
 
 impl Requests for Uninterrupted {}
+
+/// What a run goes on without.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Without {
+    /// Faults and stimuli.
+    Acting(Withdrawn),
+    /// The value of a parameter in the scenario: that of the controller comes back.
+    Parameter(String),
+}
+
+impl From<Withdrawn> for Without {
+    fn from(withdrawn: Withdrawn) -> Self {
+        Self::Acting(withdrawn)
+    }
+}
 
 /// The controller of a run, and what accompanies it.
 pub(crate) struct Control {
@@ -205,11 +220,25 @@ impl<S: Sink> Run<S> {
         self.control.controller.outcome().is_some()
     }
 
-    /// Goes on without these faults and stimuli of the scenario, between two cycles: from the next SYNC on what acts
-    /// has ended, and what has not begun never does.
-    pub fn withdraw(&mut self, withdrawn: Withdrawn) {
-        let from_ns = self.stepper.withdraw(&self.scenario, withdrawn);
-        self.control.duties.operator.withdraw(withdrawn, from_ns);
+    /// Goes on without this, between two cycles: from the next SYNC on faults and stimuli that act have ended, and those
+    /// that have not begun never do.
+    ///
+    /// # Errors
+    /// [`NameError`] for a parameter that the controller does not have.
+    pub fn go_without(&mut self, without: &Without) -> Result<(), NameError> {
+        let Control { controller, duties, .. } = &mut self.control;
+        match without {
+            Without::Acting(withdrawn) => {
+                let from_ns = self.stepper.withdraw(&self.scenario, *withdrawn);
+                duties.operator.withdraw(*withdrawn, from_ns);
+            }
+            Without::Parameter(name) => {
+                let own = controller.declared();
+                let value = own.parameters[own.place_of(name)?].value;
+                duties.named.settings().set(name, value)?;
+            }
+        }
+        Ok(())
     }
 
     /// Plays the run to its end; returns the ending, which counts only if the sink took every message.

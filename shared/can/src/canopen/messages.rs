@@ -143,8 +143,10 @@ impl EmergencyCode {
     pub const SYNC_LENGTH: Self = Self(0x8240);
     /// An RPDO is overdue.
     pub const RPDO_TIMEOUT: Self = Self(0x8250);
-    /// The encoder and the one at the joint are too far apart.
+    /// The encoder jumps, or the one at the joint is too far away.
     pub const POSITION_SENSOR: Self = Self(0x7320);
+    /// An axis that stops leaves its ramp.
+    pub const VELOCITY: Self = Self(0x8400);
     /// The following error exceeded its window (6065) for longer than allowed (6066).
     #[doc(alias("position deviation", "contouring error", "lag error"))]
     pub const FOLLOWING_ERROR: Self = Self(0x8611);

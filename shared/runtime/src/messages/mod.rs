@@ -35,7 +35,7 @@ const ZERO_BITS: u32 = 22;
 
 messages! {
     /// Targets and request for the drives, once a cycle.
-    Command on "command" keeping 2048 as "masseter/Command/122499e7837b8623" {
+    Command on "command" keeping 2048 as "masseter/Command/aa9ccbb5a914f2fa" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -52,7 +52,7 @@ messages! {
     }
 
     /// Positions, forces and states of the drives, once a cycle.
-    Reading on "reading" keeping 2048 as "masseter/Reading/77fbf2563d374143" {
+    Reading on "reading" keeping 2048 as "masseter/Reading/9d8ad5ebfa25365a" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// Cycle of the last command received when the sample was taken; 0 before the first.
@@ -95,7 +95,7 @@ messages! {
     }
 
     /// The controller's state and its estimate, once a cycle. All float64 fields but `motion_time_s` have 31 significant bits.
-    State on "state" keeping 2048 as "masseter/State/222f0a2c6bd98281" {
+    State on "state" keeping 2048 as "masseter/State/d4676753f03c0750" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -149,7 +149,7 @@ messages! {
 
     /// The signals that the controller declares, once a cycle; without any, there is no such message. A recording's
     /// definition of the message has a field for each signal.
-    Signals on "signal" keeping 2048 as "masseter/Signals/f3f2e46c64618aba" {
+    Signals on "signal" keeping 2048 as "masseter/Signals/d83baba07ded40e5" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The signals, in the order of their declaration.
@@ -158,7 +158,7 @@ messages! {
 
     /// The parameters that the controller declares, in its first cycle and in each that begins with another value. A
     /// recording's definition of the message has a field for each parameter.
-    Parameters on "parameter" keeping 256 as "masseter/Parameters/6e37d0faf79770ba" {
+    Parameters on "parameter" keeping 256 as "masseter/Parameters/97ac3b560ac142e5" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The parameters, in the order of their declaration.
@@ -167,7 +167,7 @@ messages! {
 
     /// The true state of the mechanism, once a cycle; the controller never reads it. All float64 fields have 31
     /// significant bits.
-    Truth on "truth" keeping 2048 as "masseter/Truth/ef615c1cdf89a4ab" {
+    Truth on "truth" keeping 2048 as "masseter/Truth/fa288e2ecf0cfeb2" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// The instant it describes: that of the reading's sample, ns.
@@ -192,7 +192,7 @@ messages! {
 
     /// The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads
     /// it. All float64 fields have 31 significant bits.
-    Contact on "contact" keeping 2048 as "masseter/Contact/f45400510a8a2978" {
+    Contact on "contact" keeping 2048 as "masseter/Contact/0b914d25db656913" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// End of the time that it describes: the instant of the reading's sample, ns.
@@ -206,7 +206,7 @@ messages! {
     }
 
     /// An observation of a tap on a CAN wire: a frame, or an error message in the coding of `linux/can/error.h`.
-    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/8e8544a0e0c152ab" {
+    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/1056c1b9c32a18b2" {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
         /// When its transmitter had it queued, ns; 0 on real wires.
@@ -223,7 +223,7 @@ messages! {
 
     /// Counters of the kernel for the machine and both loops. The recorder reads and records them; the message is not
     /// published.
-    Machine on "machine" keeping 1 as "masseter/Machine/83c17486fade6f0d" {
+    Machine on "machine" keeping 1 as "masseter/Machine/4fba74519f6848e4" {
         /// Time of the sample, ns.
         time_ns: u64,
         /// Time that the hypervisor had taken from all cores together, as far as the hypervisor reports it, ns.
@@ -235,7 +235,7 @@ messages! {
     }
 
     /// A single occurrence: a change of state, a fault, an alarm.
-    Event on "event" keeping 1024 as "masseter/Event/ddd3c1af3d2bd72a" {
+    Event on "event" keeping 1024 as "masseter/Event/74061a7c3e4137f5" {
         /// When, ns.
         time_ns: u64,
         /// Cycle of the process that reports it.

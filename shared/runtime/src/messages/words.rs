@@ -23,6 +23,7 @@ fn place_of(event: &Event, interface: Option<&str>) -> String {
     let bus = interface.map_or_else(|| bus.to_string(), |name| format!("{bus}, {name}"));
     match (AXIS_NAMES.get(event.axis as usize), node) {
         _ if event.cause == Cause::LawFailed.code() => "the pose law".to_owned(),
+        _ if event.cause == Cause::MotionLate.code() => "the motion".to_owned(),
         _ if event.cause == Cause::FoodBroke.code() => format!("tooth {}", event.object),
         (None, 0) if event.source == Source::Controller.code() => "the mechanism".to_owned(),
         (Some(axis), 1..) => format!("axis {axis} (node {node} on bus {bus})"),
@@ -133,6 +134,12 @@ fn words_of_run(cause: Cause, event: &Event, interface: Option<&str>) -> Option<
              controller.lead_cycles if it smooths its targets",
             millimetres(event.value),
             millimetres(event.limit)
+        ),
+        Cause::MotionLate => format!(
+            "late by {:.1} ms, limit {:.1} ms, since frames of the drives or commands were lost or late; check wiring and \
+             bit rate, or raise checks.motion_lag_ms",
+            event.value * 1e3,
+            event.limit * 1e3
         ),
         Cause::NodeStopped => format!(
             "left the NMT state operational without a command of the master; now in state {value}; read the drive's own \
@@ -280,6 +287,13 @@ mod tests {
             at(Cause::NotEnabled, 0x0233, 0x5112)
                 .contains("switched on (0233h), EMCY 5112h (logic supply too low);")
         );
+    }
+
+    #[test]
+    fn a_late_motion_says_by_how_much_and_what_to_check() {
+        let late = Event { value: 0.021, limit: 0.02, axis: NO_AXIS, ..event(Cause::MotionLate) };
+        let said = explain(&late, &[]).unwrap();
+        assert!(said.starts_with("the motion: late by 21.0 ms, limit 20.0 ms, since frames"), "{said}");
     }
 
     #[test]
