@@ -46,7 +46,7 @@ bite_s = 0.6
 """
 
 SOFT = HOLD + "[food]\n"
-TEETH = HOLD + "[teeth]\nclearance_m = -5e-5\n"
+TEETH = HOLD + "[teeth]\nclearance_m = -2e-5\n"
 
 
 def found(name: str, **keys: object) -> str:

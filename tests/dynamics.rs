@@ -56,6 +56,32 @@ fn imbalance_n(truths: &[Truth], forces_of: impl Fn(&Truth) -> Vector6<f64>) -> 
     (squares.sum::<Vector6<f64>>() / (truths.len() - 1) as f64).map(f64::sqrt)
 }
 
+/// The drives' work of a chewing cycle goes into friction, food and teeth, and nothing is left over.
+#[test]
+fn the_ledger_of_a_chewing_cycle_closes_with_friction_food_and_teeth() {
+    let quantity = "| energy of a chewing cycle with friction, food and teeth: what work does not explain, of the drives' work |";
+    let is_stated = |line: &str| line.starts_with(quantity) && line.ends_with("| 0.1 % |");
+    assert!(DOCUMENT.lines().any(is_stated), "docs/dynamics.md has no row: {quantity}");
+    for model in ["smooth", "lugre"] {
+        let workspace = Workspace::new(&format!(
+            "duration_s = 5.0\n[motion]\nkind = 'chewing'\ncycle_rate_hz = 1.0\n[food]\n[teeth]\n\
+             [dynamics.friction]\nmodel = '{model}'\n"
+        ));
+        let output = workspace.run_virtual(&[]);
+        assert!(output.status.success(), "{}", stdout(&output));
+        let truths = truths(&workspace);
+        let gap_j = |truth: &Truth| truth.kinetic_j + truth.potential_j - truth.work_j.iter().sum::<f64>();
+        for cycle in truths[truths.len() - 4100..].chunks_exact(1000) {
+            let motors_j = cycle.windows(2).map(|pair| (pair[1].work_j[0] - pair[0].work_j[0]).abs());
+            let share = (gap_j(&cycle[999]) - gap_j(&cycle[0])).abs() / motors_j.sum::<f64>();
+            let works_j: Vec<_> =
+                (0..6).map(|kind| cycle[999].work_j[kind] - cycle[0].work_j[kind]).collect();
+            println!("{quantity} {:.6} % | 0.1 % | {model}: {works_j:.4?} J", 100.0 * share);
+            assert!(share <= 1e-3, "{model}: {share}");
+        }
+    }
+}
+
 #[test]
 fn mean_forces_balance_the_chewing_motion_and_samples_do_not() {
     for rate_hz in [1.43, 2.17] {

@@ -119,6 +119,24 @@ fn statuses_name_what_the_mechanism_cannot_do() {
     assert!(!line.ends_with(",ok") && line.starts_with(",,,"), "{line}");
 }
 
+/// Rounding hides a mechanism of centimetres on legs of a thousand kilometres: no other word is true of such a line.
+#[test]
+fn positions_beyond_a_kilometre_are_out_of_range_and_named_with_the_range() {
+    let legs = "0,0,0,1e8,1e8,1e8\n0,0,0,1e154,1e154,1e154\n0,0,-1001,0.27,0.27,0.27\n0,0,0,0.27,0.27,0.27\n";
+    for more in [&[][..], &["--continuous"], &["--solver", "newton"], &["--all"]] {
+        let output = pipe(&[&["fk"], more].concat(), &format!("{ACTUATORS}{legs}"));
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+        assert_eq!(statuses(&output)[..3], ["out_of_range"; 3], "{more:?}");
+        assert!(!statuses(&output)[3..].contains(&"out_of_range".to_owned()), "{more:?}");
+        let said = "standard input:2: 1e8 m is out of range; use -1000 to 1000 m";
+        assert!(stderr(&output).contains(said), "{}", stderr(&output));
+    }
+    let poses = "x_m,y_m,z_m,qw,qx,qy,qz\n0,0,1e300,1,0,0,0\n0,0,999,1,0,0,0\n";
+    let output = pipe(&["ik"], poses);
+    assert_eq!(statuses(&output), ["out_of_range", "outside_stroke"]);
+    assert!(stderr(&output).contains("1e300 m is out of range"), "{}", stderr(&output));
+}
+
 /// Upside down, and below the base: the strokes would do, and `fk` gives another pose for them.
 #[test]
 fn a_pose_in_which_the_mechanism_cannot_stand_is_a_wrong_assembly() {

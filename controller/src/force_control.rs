@@ -5,10 +5,12 @@
 //! M v̇ + D v = f_desired − f, with M = D times 3 ms.
 //!
 //! The speed begins with that of the motion, so that nothing jumps. The damping D grows towards the contact of the
-//! teeth. A bite ends after its time, at a break of the food, or when the opening motion reaches the jaw. After that
+//! teeth, and with the stiffness that the bite shows. A bite ends after its time, at a break of the food, or when the opening motion reaches the jaw. After that
 //! the jaw does not close. The jaw waits, gives way to more than the force of contact, and follows the motion again
 //! when the motion opens. The law controls the height only; the other five freedoms keep to the motion. Limit of
 //! stability: `docs/dynamics-control.md`.
+
+mod shown_stiffness;
 
 use std::f64::consts::PI;
 
@@ -22,6 +24,7 @@ use nalgebra::Translation3;
 use crate::forces::signal;
 use crate::pose_control::PoseControl;
 use crate::pose_law::{Demand, Detour, LawFailed, PoseLaw};
+use shown_stiffness::ShownStiffness;
 
 /// Cycles of a fall of the bite force to half when food breaks.
 const BREAK_CYCLES: usize = 10;
@@ -36,6 +39,10 @@ const NEAR_M: f64 = 2e-6;
 const SLOW_M_S: f64 = 2e-3;
 /// Share of a bite for the ramp of a hold.
 const RAMP_SHARE: f64 = 0.1;
+/// Noise of a load cell as a share of the force of contact: most of what a scenario may have.
+const CELL_DOUBT: f64 = 0.2;
+/// Share of the force of contact below which nothing is between the teeth.
+const EMPTY_SHARE: f64 = 0.5;
 
 /// The source of the jaw's height.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,6 +69,8 @@ pub(crate) struct ForceControl {
     position: PoseControl,
     /// Height of the platform in the closed mouth, m.
     closed_m: f64,
+    /// The stiffness of the present bite.
+    stiffness: ShownStiffness,
     phase: Phase,
     /// The last height of the motion, m.
     motion_m: Option<f64>,
@@ -89,6 +98,11 @@ impl ForceControl {
             },
             position: PoseControl::new(&scenario.controller, scenario.rate_hz),
             closed_m,
+            stiffness: ShownStiffness::new(
+                scenario.period_s(),
+                scenario.source_s(&config),
+                scenario.force_delay_s(&config),
+            ),
             phase: Phase::Free,
             motion_m: None,
             speed_m_s: 0.0,
@@ -116,6 +130,15 @@ impl ForceControl {
         let height_m = demand.ahead.translation.z;
         let before_m = self.motion_m.replace(height_m).unwrap_or(height_m);
         self.motion_m_s = (height_m - before_m) / self.period_s;
+        let doubt_n = match self.config.source {
+            ForceSource::Estimate => demand.external.map_or(f64::INFINITY, |external| external.uncertainty_n),
+            ForceSource::LoadCell => CELL_DOUBT * self.config.contact_n,
+        };
+        let at_sample_m = demand.desired.translation.z + self.detour().at_sample_m.z;
+        self.stiffness.take(at_sample_m, bite_n, doubt_n);
+        if self.phase == Phase::Free && bite_n < EMPTY_SHARE * self.config.contact_n {
+            self.stiffness.forget();
+        }
         let is_full = self.bites_n[..FULL_CYCLES].iter().all(|bite_n| bite_n.abs() >= self.range_n);
         if is_full { Err(LawFailed) } else { Ok(()) }
     }
@@ -149,13 +172,14 @@ impl ForceControl {
         }
     }
 
-    /// Damping at the last requested height, N per m/s: between food and teeth by the opening of the mouth.
+    /// Damping at the last requested height, N per m/s: between food and teeth by the opening of the mouth, and at least what
+    /// the shown stiffness needs.
     fn damping_n_s_per_m(&self) -> f64 {
         let Self { config, closed_m, offsets_m, motion_m, .. } = self;
         let opening_m = closed_m - motion_m.unwrap_or(*closed_m) - offsets_m[0];
         let share = (opening_m / config.tooth_zone_m).clamp(0.0, 1.0);
         let ratio = config.damping_n_s_per_m / config.tooth_damping_n_s_per_m;
-        config.tooth_damping_n_s_per_m * ratio.powf(share)
+        (config.tooth_damping_n_s_per_m * ratio.powf(share)).max(self.stiffness.least_damping_n_s_per_m())
     }
 
     /// The desired speed of the height in this phase, m/s.
@@ -226,6 +250,7 @@ impl PoseLaw for ForceControl {
         let signals = vec![
             signal("desired_bite_force_n", "N", "What the bite force is to be; 0 between bites."),
             signal("force_detour_m", "m", "Height asked for above that of the motion."),
+            signal("force_stiffness_n_per_m", "N/m", "Stiffness that the bite has shown so far."),
             signal("force_phase", "", "0: position control; 1: force control; 2: opening; 3: food broke."),
         ];
         Declared { signals, ..self.position.declared() }
@@ -242,7 +267,7 @@ impl PoseLaw for ForceControl {
             Phase::Opening => 2.0,
             Phase::Broken => 3.0,
         };
-        signals.copy_from_slice(&[self.desired_n, self.offsets_m[0], phase]);
+        signals.copy_from_slice(&[self.desired_n, self.offsets_m[0], self.stiffness.n_per_m, phase]);
     }
 
     fn branch(&self) -> Result<Box<dyn PoseLaw>, NoBranch> {

@@ -4,12 +4,14 @@
 use masseter_model::dynamics::{Bodies, Equations, Friction, FrictionModel, Loads, Motion, Reactions};
 use masseter_model::geometry::{AXES, Mechanism, Pose, Twist};
 use masseter_runtime::messages::Reading;
+use masseter_runtime::messages::codes::Cause;
 use masseter_runtime::named::Signal;
-use masseter_scenario::{ForceEstimateConfig, Scenario};
+use masseter_scenario::{ForceControlConfig, ForceEstimateConfig, ForceSource, Scenario};
 use nalgebra::{SVector, Vector6};
 
 use crate::forces::calibration::Calibration;
 use crate::pose_law::{Detour, ExternalForce, PoseLaw};
+use crate::safety::Fault;
 use crate::sequencer::Sequencer;
 
 mod calibration;
@@ -32,6 +34,8 @@ pub(crate) struct Forces {
     has_load_cell: bool,
     /// Last value of the load cell, N.
     pub(crate) load_cell_n: Option<f64>,
+    /// None without control of the bite force in the scenario.
+    control: Option<ForceControlConfig>,
     /// None without feed-forward in the scenario.
     feed_forward: Option<FeedForward>,
     /// Offsets of this cycle, N.
@@ -46,6 +50,7 @@ impl Forces {
             observer: scenario.is_force_estimated().then(|| ForceObserver::new(scenario, model())),
             has_load_cell: scenario.load_cell.is_some(),
             load_cell_n: None,
+            control: scenario.force_control,
             feed_forward: scenario.controller.feed_forward_torque.then(feed_forward),
             offset_n: [0.0; AXES],
         }
@@ -70,6 +75,21 @@ impl Forces {
     /// The external force on the platform, once there is an estimate.
     pub(crate) fn external(&self) -> Option<ExternalForce> {
         self.observer.as_ref().and_then(ForceObserver::external)
+    }
+
+    /// Refuses a bite force above the limit of the force control, whatever law controls the force.
+    pub(crate) fn check_bite(&self) -> Result<(), Fault> {
+        let Some(control) = &self.control else { return Ok(()) };
+        let bite_n = match control.source {
+            ForceSource::Estimate => self.external().map(|external| external.bite_n()),
+            ForceSource::LoadCell => self.load_cell_n,
+        };
+        match bite_n.unwrap_or_default() {
+            bite_n if bite_n > control.limit_n() => {
+                Err(Fault::new(Cause::ForceLimit, bite_n, control.limit_n()))
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The motion begins anew.

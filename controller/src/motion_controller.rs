@@ -115,6 +115,7 @@ impl MotionController {
         if let Some(estimated) = &demand.estimated {
             self.supervise(&desired, estimated)?;
         }
+        self.forces.check_bite()?;
         let asked = self.law.command(&demand)?;
         self.targets.ask_for(&asked, demand.period_s)?;
         let Sequencer { period_s, config, .. } = &self.sequencer;

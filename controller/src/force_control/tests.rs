@@ -130,13 +130,14 @@ fn a_half_sine_comes_near_its_peak_and_back() {
     assert!((22.0..33.0).contains(&peak_n), "{peak_n}");
 }
 
-/// The stated limit is that of a pure delay. The world has lags instead, so its own limit is less than half as high.
+/// The damping is that of the limit for a stated stiffness. In the worst case the real one is five times as large.
 #[test]
-fn inside_the_limit_of_stability_a_bite_is_quiet_and_far_outside_of_it_the_bite_shakes() {
+fn a_stiffness_stated_wrong_by_up_to_five_makes_a_bite_slow_and_never_hard() {
     for stiffness_n_per_m in [3500.0, 35_000.0, 1.5e5] {
-        let delay_s = LEAD_CYCLES as f64 * PERIOD_S + OBSERVER_S + ForceControlConfig::MASS_TIME_S;
-        let least = ForceControlConfig::least_damping_n_s_per_m(stiffness_n_per_m, delay_s);
-        for (damping_n_s_per_m, is_quiet) in [(least, true), (2.0 * least, true), (0.3 * least, false)] {
+        for stated in [0.2, 0.5, 1.0, 2.0, 5.0] {
+            let delay_s = ForceControlConfig::delay_s(LEAD_CYCLES as f64 * PERIOD_S, OBSERVER_S);
+            let damping_n_s_per_m =
+                ForceControlConfig::least_damping_n_s_per_m(stated * stiffness_n_per_m, delay_s);
             let config = ForceControlConfig {
                 damping_n_s_per_m,
                 tooth_damping_n_s_per_m: damping_n_s_per_m,
@@ -149,13 +150,12 @@ fn inside_the_limit_of_stability_a_bite_is_quiet_and_far_outside_of_it_the_bite_
             let mut world = World { stiffness_n_per_m, thickness_m, ..World::new(config) };
             world.run_to(0.85);
             let swing_n = world.most_n([0.75, 0.85]) - world.least_n([0.75, 0.85]);
+            let most_n = world.most_n([0.0, 0.85]);
+            let case = format!("{stiffness_n_per_m} N/m, stated {stated} times: {swing_n} N, {most_n} N");
+            println!("{case}");
             // A strongly shaking bite looks like a break of food.
-            let found = swing_n < 2.0 && world.law.phase != Phase::Broken;
-            assert_eq!(
-                found, is_quiet,
-                "{stiffness_n_per_m} N/m, {damping_n_s_per_m} N s/m: {swing_n} N, {:?}",
-                world.law.phase
-            );
+            assert!(swing_n < 2.0 && world.law.phase != Phase::Broken, "{case}");
+            assert!(most_n < world.law.config.limit_n(), "{case}");
         }
     }
 }

@@ -96,7 +96,7 @@ impl Gate {
                 stroke_m: [low_m - margin_m, high_m + margin_m],
                 max_velocity_m_s: drive.max_velocity_m_s,
                 max_acceleration_m_s2: drive.max_acceleration_m_s2,
-                max_force_n: drive.max_force_n * scenario.dry.force_now(),
+                max_force_n: scenario.max_force_n(axis),
                 standing_m: scenario.can.following_limit_m.min(drive.max_velocity_m_s * scenario.period_s()),
                 followed: None,
             }

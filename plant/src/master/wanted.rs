@@ -334,7 +334,7 @@ fn known_objects(scenario: &Scenario, axis: usize) -> Result<[KnownObject; 14], 
     let quick_stop = i64::from(scale.acceleration(drive.quick_stop_deceleration_m_s2));
     let window = i64::from(scale.window(drive.following_error_m));
     let [lowest, highest] = software_limits(scenario, axis);
-    let force_share = drive.max_force_n / drive.rated_force_n * scenario.dry.force_now();
+    let force_share = scenario.max_force_n(axis) / drive.rated_force_n;
     let force_limit = (force_share * 1000.0).round().clamp(1.0, f64::from(u16::MAX)) as i64;
     let (period, exponent) = period(scenario, profile)?;
     let key = |slide, leg| if axis < LEGS { slide } else { leg };

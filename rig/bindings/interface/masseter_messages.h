@@ -7,7 +7,7 @@
 #include <stddef.h>
 #include <stdint.h>
 
-#define MASSETER_LAYOUT_VERSION 14u
+#define MASSETER_LAYOUT_VERSION 15u
 /* masseter_event.axis when no axis is concerned. */
 #define MASSETER_NO_AXIS 4294967295u
 /* masseter_reading.drive_state of a drive not heard of yet, or lost. */
@@ -199,6 +199,8 @@ enum masseter_cause {
     MASSETER_CAUSE_END_STOP_HIT = 62,
     /* A drive acknowledged a value and shows another one (value that it shows; the limit is the one written). */
     MASSETER_CAUSE_NOT_KEPT = 63,
+    /* The bite force exceeds the limit of the force control (N). */
+    MASSETER_CAUSE_FORCE_LIMIT = 64,
     /* The motion waited too long for lost or late commands and readings (s). */
     MASSETER_CAUSE_MOTION_LATE = 65,
 };
@@ -221,7 +223,7 @@ enum masseter_no_pose {
 };
 
 #define MASSETER_READING_TOPIC "reading"
-#define MASSETER_READING_TYPE_NAME "masseter/Reading/9d8ad5ebfa25365a"
+#define MASSETER_READING_TYPE_NAME "masseter/Reading/62dfc6bcca479392"
 
 /* Positions, forces and states of the drives, once a cycle. */
 typedef struct masseter_reading {
@@ -296,7 +298,7 @@ static_assert(offsetof(masseter_reading, fresh_axes) == 256, "offset of fresh_ax
 static_assert(offsetof(masseter_reading, master_fault) == 260, "offset of master_fault");
 
 #define MASSETER_COMMAND_TOPIC "command"
-#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/aa9ccbb5a914f2fa"
+#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/f5b88debf7e601e0"
 
 /* Targets and request for the drives, once a cycle. */
 typedef struct masseter_command {
@@ -332,7 +334,7 @@ static_assert(offsetof(masseter_command, request) == 136, "offset of request");
 static_assert(offsetof(masseter_command, controller_state) == 140, "offset of controller_state");
 
 #define MASSETER_STATE_TOPIC "state"
-#define MASSETER_STATE_TYPE_NAME "masseter/State/d4676753f03c0750"
+#define MASSETER_STATE_TYPE_NAME "masseter/State/2e7a5131035419cc"
 
 /* The controller's state and its estimate, once a cycle. All float64 fields but `motion_time_s` have 31 significant bits. */
 typedef struct masseter_state {
@@ -419,7 +421,7 @@ static_assert(offsetof(masseter_state, iterations) == 288, "offset of iterations
 static_assert(offsetof(masseter_state, controller_state) == 292, "offset of controller_state");
 
 #define MASSETER_EVENT_TOPIC "event"
-#define MASSETER_EVENT_TYPE_NAME "masseter/Event/74061a7c3e4137f5"
+#define MASSETER_EVENT_TYPE_NAME "masseter/Event/9ef3b315edc5cd35"
 
 /* A single occurrence: a change of state, a fault, an alarm. */
 typedef struct masseter_event {
@@ -476,7 +478,7 @@ static_assert(offsetof(masseter_event, value) == 72, "offset of value");
 static_assert(offsetof(masseter_event, limit) == 80, "offset of limit");
 
 #define MASSETER_TRUTH_TOPIC "truth"
-#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/fa288e2ecf0cfeb2"
+#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/1f4bd7c5b12a8199"
 
 /* The true state of the mechanism, once a cycle; the controller never reads it. All float64 fields have 31 significant bits. */
 typedef struct masseter_truth {
@@ -506,9 +508,15 @@ typedef struct masseter_truth {
     double bite_force_n;
     /* Bite force at the sample, N. */
     double bite_force_sample_n;
+    /* Work on the bodies since the start, J: of the drives, of friction in slides, legs, and hinges with balls, of teeth and food, of everything else (pushes, payload, end stops). */
+    double work_j[6];
+    /* Energy of the bodies' motion, J. */
+    double kinetic_j;
+    /* Energy of their height above that of the start, J. */
+    double potential_j;
 } masseter_truth;
 
-static_assert(sizeof(masseter_truth) == 304, "size of masseter_truth");
+static_assert(sizeof(masseter_truth) == 368, "size of masseter_truth");
 static_assert(offsetof(masseter_truth, seq) == 0, "offset of seq");
 static_assert(offsetof(masseter_truth, published_ns) == 8, "offset of published_ns");
 static_assert(offsetof(masseter_truth, version) == 16, "offset of version");
@@ -522,9 +530,12 @@ static_assert(offsetof(masseter_truth, force_n) == 192, "offset of force_n");
 static_assert(offsetof(masseter_truth, force_sample_n) == 240, "offset of force_sample_n");
 static_assert(offsetof(masseter_truth, bite_force_n) == 288, "offset of bite_force_n");
 static_assert(offsetof(masseter_truth, bite_force_sample_n) == 296, "offset of bite_force_sample_n");
+static_assert(offsetof(masseter_truth, work_j) == 304, "offset of work_j");
+static_assert(offsetof(masseter_truth, kinetic_j) == 352, "offset of kinetic_j");
+static_assert(offsetof(masseter_truth, potential_j) == 360, "offset of potential_j");
 
 #define MASSETER_CONTACT_TOPIC "contact"
-#define MASSETER_CONTACT_TYPE_NAME "masseter/Contact/0b914d25db656913"
+#define MASSETER_CONTACT_TYPE_NAME "masseter/Contact/23e17f519c62e157"
 
 /* The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads it. All float64 fields have 31 significant bits. */
 typedef struct masseter_contact {

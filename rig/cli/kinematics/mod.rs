@@ -13,7 +13,7 @@ use masseter_controller::kinematics::{
     Assembly, ForwardError, ForwardTracker, Method, Options, Solution, Solutions, nearest_assembly_m, solve,
 };
 use masseter_model::geometry::{
-    Actuators, Conditioning, InverseError, Jacobian, Joints, LEGS, Mechanism, Pose, StrokeLimits,
+    AXES, Actuators, Conditioning, InverseError, Jacobian, Joints, LEGS, Mechanism, Pose, StrokeLimits,
 };
 use masseter_runtime::messages::{pose_fields, pose_from_fields};
 use masseter_terminal::Exit;
@@ -39,6 +39,10 @@ const INVERSE: Columns = Columns {
     read: "x_m,y_m,z_m,qw,qx,qy,qz",
     written: "d1_m,d2_m,d3_m,l1_m,l2_m,l3_m,theta1_rad,theta2_rad,theta3_rad",
 };
+/// Farthest position, m: ten times the longest dimension of a mechanism. Beyond, rounding hides the mechanism.
+const FARTHEST_M: f64 = 1000.0;
+/// Status of a line with a position beyond.
+const OUT_OF_RANGE: &str = "out_of_range";
 /// How far a quaternion's norm may be from 1.
 const UNIT_TOLERANCE: f64 = 1e-3;
 /// Where the paper's and Newton's iteration start without `--guess`: the paper's neutral pose.
@@ -79,7 +83,7 @@ enum Solver {
     Newton,
 }
 
-/// Status `ok`, `outside_stroke`, or the reason of [`ForwardError`]. The paper's and Newton's iteration
+/// Status `ok`, `outside_stroke`, `out_of_range`, or the reason of [`ForwardError`]. The paper's and Newton's iteration
 /// may come to a solution at which the mechanism cannot stand; its status is then `wrong_assembly`,
 /// and the values are written all the same.
 pub(crate) fn forward(args: &FkArgs) -> anyhow::Result<Exit> {
@@ -90,13 +94,13 @@ pub(crate) fn forward(args: &FkArgs) -> anyhow::Result<Exit> {
     let strokes = *mechanism.strokes();
     let mut solver = Chosen::new(args, mechanism);
     if args.continuous {
-        return convert_in_turn(&args.csv, FORWARD, |_, values, lines| {
-            write_solution(&strokes, &mut solver, &Actuators::from_axes(values), lines);
+        return convert_in_turn(&args.csv, FORWARD, |line, values, lines| {
+            write_solution(&strokes, &mut solver, line, values, lines);
             Ok(())
         });
     }
-    convert(&args.csv, FORWARD, |_, values, lines| {
-        write_solution(&strokes, &mut solver.clone(), &Actuators::from_axes(values), lines);
+    convert(&args.csv, FORWARD, |line, values, lines| {
+        write_solution(&strokes, &mut solver.clone(), line, values, lines);
         Ok(())
     })
 }
@@ -134,7 +138,26 @@ impl Chosen {
     }
 }
 
-fn write_solution(strokes: &StrokeLimits, solver: &mut Chosen, actuators: &Actuators, lines: &mut Lines) {
+/// Whether a position of a line is too far away, which is then explained.
+fn is_out_of_range(line: u64, positions_m: &[f64], lines: &mut Lines) -> bool {
+    let far_m = positions_m.iter().find(|position_m| position_m.abs() > FARTHEST_M);
+    if let Some(far_m) = far_m {
+        lines.remark(line, format!("{far_m:e} m is out of range; use -{FARTHEST_M} to {FARTHEST_M} m"));
+    }
+    far_m.is_some()
+}
+
+fn write_solution(
+    strokes: &StrokeLimits,
+    solver: &mut Chosen,
+    line: u64,
+    values: [f64; AXES],
+    lines: &mut Lines,
+) {
+    if is_out_of_range(line, &values, lines) {
+        return lines.row([], OUT_OF_RANGE);
+    }
+    let actuators = &Actuators::from_axes(values);
     let solution = match solver.solve(actuators) {
         Ok(solution) => solution,
         Err(error) => return lines.row([], error.reason()),
@@ -162,6 +185,10 @@ fn parse_guess(text: &str) -> Result<[f64; 3], &'static str> {
 /// leg angles.
 fn every_solution(args: &CsvArgs, mechanism: &Mechanism) -> anyhow::Result<Exit> {
     convert(args, EVERY, |line, values, lines| {
+        if is_out_of_range(line, &values, lines) {
+            write_none(line, f64::NAN, OUT_OF_RANGE, lines);
+            return Ok(());
+        }
         let actuators = Actuators::from_axes(values);
         match Solutions::new(mechanism, &actuators) {
             Ok(solutions) if solutions.count() > 0 => {
@@ -172,9 +199,9 @@ fn every_solution(args: &CsvArgs, mechanism: &Mechanism) -> anyhow::Result<Exit>
             }
             Ok(_) => {
                 let nearest_m = nearest_assembly_m(mechanism, &actuators);
-                write_none(line, nearest_m, &ForwardError::Unassemblable, lines);
+                write_none(line, nearest_m, ForwardError::Unassemblable.reason(), lines);
             }
-            Err(error) => write_none(line, f64::NAN, &error, lines),
+            Err(error) => write_none(line, f64::NAN, error.reason(), lines),
         }
         Ok(())
     })
@@ -188,10 +215,10 @@ fn status_among_all(solution: &Solution) -> &'static str {
     }
 }
 
-fn write_none(line: u64, nearest_m: f64, error: &ForwardError, lines: &mut Lines) {
+fn write_none(line: u64, nearest_m: f64, reason: &str, lines: &mut Lines) {
     let absent = EVERY.written.split(',').count() - 2;
     let values = iter::once(line as f64).chain(iter::repeat_n(f64::NAN, absent)).chain([nearest_m]);
-    lines.row(values, error.reason());
+    lines.row(values, reason);
 }
 
 /// The values after the line.
@@ -217,11 +244,16 @@ fn values_of(
 }
 
 /// Status `ok`; `outside_stroke`, or `wrong_assembly` where the mechanism cannot stand as it is built (the values are
-/// written all the same); or `singular` (a leg without length).
+/// written all the same); `out_of_range`; or `singular` (a leg without length).
 pub(crate) fn inverse(args: &CsvArgs) -> anyhow::Result<Exit> {
     let mechanism = args.mechanism()?;
-    convert(args, INVERSE, |_, values, lines| {
-        match mechanism.inverse(&unit_pose(values)?) {
+    convert(args, INVERSE, |line, values: [f64; 7], lines| {
+        let pose = unit_pose(values)?;
+        if is_out_of_range(line, &values[..3], lines) {
+            lines.row([], OUT_OF_RANGE);
+            return Ok(());
+        }
+        match mechanism.inverse(&pose) {
             Ok(joints) => {
                 let values = joints.actuators.to_axes().into_iter().chain(joints.theta_rad);
                 lines.row(values, inverse_status(&mechanism, &joints));

@@ -67,6 +67,8 @@ pub(super) struct Lines {
     width: usize,
     /// Where and why lines could not be read.
     refusals: Vec<(u64, String)>,
+    /// Where and why lines that were read have no solution.
+    remarks: Vec<(u64, String)>,
 }
 
 impl Lines {
@@ -76,6 +78,11 @@ impl Lines {
         let cells = values.map(|value| if value.is_nan() { String::new() } else { shortest(value) });
         let written = self.csv.write_record(cells.chain([status.to_owned()]));
         written.expect("all lines have the same width, and a vector takes them");
+    }
+
+    /// Explains a line of the input on standard error.
+    pub(super) fn remark(&mut self, line: u64, reason: String) {
+        self.remarks.push((line, reason));
     }
 }
 
@@ -106,7 +113,8 @@ fn solve_lines<const IN: usize>(
     mut solve: impl FnMut(u64, [f64; IN], &mut Lines) -> Solved,
 ) -> Lines {
     let width = columns.written.split(',').count();
-    let mut lines = Lines { csv: csv::Writer::from_writer(Vec::new()), width, refusals: Vec::new() };
+    let csv = csv::Writer::from_writer(Vec::new());
+    let mut lines = Lines { csv, width, refusals: Vec::new(), remarks: Vec::new() };
     let read: Vec<_> = columns.read.split(',').collect();
     for line in batch {
         let text = line.text.as_deref().map_err(Clone::clone);
@@ -141,6 +149,9 @@ fn stream(
             for mut lines in solve(&batch) {
                 lines.csv.flush()?;
                 output.write_all(lines.csv.get_ref())?;
+                for (line, remark) in lines.remarks {
+                    status!("{name}:{line}: {remark}");
+                }
                 for (line, reason) in lines.refusals {
                     status!("{name}:{line}: {reason}");
                     exit = Exit::Usage;

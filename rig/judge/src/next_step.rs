@@ -84,6 +84,8 @@ next_steps! {
     Pose => "Compare the scenario's `mechanism` with the rig, and the motion with its reach (docs/forward-kinematics.md, docs/motions.md).",
     /// SAFE STOP by a start too far away.
     Start => "Bring the jaw closer to the first pose of the motion, or raise `controller.start_tolerance_mm` (docs/robot.md).",
+    /// SAFE STOP by a bite force above the limit.
+    TooHard => "Close more slowly, or state the stiffness of food and teeth in `force_control`; `overload` is the limit (docs/dynamics-control.md).",
     /// SAFE STOP without a cause of these.
     Stop => "Read the events in `RUN/report.html` from the first fault on; docs/troubleshooting.md lists causes and remedies.",
     /// DIED: the controller.
@@ -193,8 +195,8 @@ impl NextStep {
         use Cause::{
             AccelerationLimit, BadMessage, BootTimeout, BusOff, BusRefused, CommandLost, DriveFault,
             DuplicateNode, Emergency, EnableTimeout, EndStopHit, FaultAtStart, FaultFound, FollowingError,
-            ForeignCommand, ForwardKinematics, HeartbeatLost, HomeOffset, InverseKinematics, LawFailed,
-            MotionLate, NodeRestarted, NodeStopped, NotAccepted, NotEnabled, NotKept, NotReady,
+            ForceLimit, ForeignCommand, ForwardKinematics, HeartbeatLost, HomeOffset, InverseKinematics,
+            LawFailed, MotionLate, NodeRestarted, NodeStopped, NotAccepted, NotEnabled, NotKept, NotReady,
             OrientationLost, ProcessDataLost, SdoAborted, SdoTimeout, SecondMaster, StaleReading,
             StartTooFar, StillPowered, StrokeLimit, TrackingLost, UnknownNode, VelocityLimit, WrongIdentity,
             WrongLength, WrongObject, WrongPdo, WrongUnit,
@@ -219,6 +221,7 @@ impl NextStep {
             LawFailed | BadMessage | ForeignCommand => Self::Law,
             ForwardKinematics | InverseKinematics => Self::Pose,
             StartTooFar => Self::Start,
+            ForceLimit => Self::TooHard,
             _ => Self::Stop,
         }
     }

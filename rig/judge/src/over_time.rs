@@ -45,6 +45,9 @@ pub struct OverTime {
     pub smooth_force_n: [Curve; AXES],
     /// Vertical force of food and upper teeth on the jaw, N.
     pub bite_force_n: Curve,
+    /// Of the emulated mechanism since the start, J: work of the drives, of friction, of everything else, and the energy of
+    /// motion and height that is their sum.
+    pub energy_j: [Curve; ENERGIES],
     /// Share of each bus in use, 0 to 1.
     pub bus_load: Vec<Curve>,
     /// The controller's signals.
@@ -61,8 +64,8 @@ pub(super) struct OverTimeCollector {
     motion_began_ns: Option<u64>,
     jaw: Series<Extremes<{ ANGLE + 1 }>>,
     late: Series<Extremes<2>>,
-    /// Of the axes, and the bite force.
-    axes: Series<Extremes<{ BITE_FORCE + 1 }>>,
+    /// Of the axes, the bite force, and the ledger of energy.
+    axes: Series<Extremes<{ ENERGY + ENERGIES }>>,
     smoothing: Smoothing<AXES>,
     smooth_force_n: Series<Extremes<AXES>>,
     reported_m: Series<Extremes<AXES>>,
@@ -83,11 +86,15 @@ pub(super) enum Place {
 const DISTANCE: usize = 9;
 const ANGLE: usize = 10;
 
-/// Indices of the first axis in each quantity, and of the bite force behind them.
+/// Curves of the ledger of energy.
+const ENERGIES: usize = 4;
+
+/// Indices of the first axis in each quantity, and of the bite force and the energies behind them.
 const POSITION: usize = 0;
 const VELOCITY: usize = AXES;
 const FORCE: usize = 2 * AXES;
 const BITE_FORCE: usize = 3 * AXES;
+const ENERGY: usize = BITE_FORCE + 1;
 
 /// Time over which the load of a bus is a share and a wake-up the latest of several, ns.
 const WIDE_NS: u64 = 10_000_000;
@@ -144,6 +151,10 @@ impl OverTimeCollector {
         self.axes.add_all(since_ns, VELOCITY, &truth.joint_m_s);
         self.force(since_ns, truth.force_n);
         self.axes.add(since_ns, BITE_FORCE, truth.bite_force_n);
+        let [motors_j, slides_j, legs_j, joints_j, contact_j, others_j] = truth.work_j;
+        let stored_j = truth.kinetic_j + truth.potential_j;
+        let energies_j = [motors_j, slides_j + legs_j + joints_j, contact_j + others_j, stored_j];
+        self.axes.add_all(since_ns, ENERGY, &energies_j);
     }
 
     /// Positions that drives report of an emulated mechanism. An axis without news has none.
@@ -211,6 +222,7 @@ impl OverTimeCollector {
             force_n: self.axes.bands(FORCE),
             smooth_force_n: self.smooth_force_n.bands(0),
             bite_force_n: self.axes.band(BITE_FORCE),
+            energy_j: self.axes.bands(ENERGY),
             bus_load: self.busy_ns.iter().map(|bus| self.recorded(load(bus))).collect(),
             signals: (0..signals).map(|place| self.signals.band(place)).collect(),
         }

@@ -63,6 +63,12 @@ impl DriveConfig {
     pub fn increments(&self, metres: f64) -> f64 {
         (metres / self.encoder_resolution_m).round()
     }
+
+    /// The stiffness of an axis that its loops hold at rest, N/m: the part of their force that is in phase with a
+    /// deviation x, as they answer −K (K_p + s) (1 + 1/(T s)) x.
+    pub fn stiffness_n_per_m(&self) -> f64 {
+        self.velocity_gain_n_s_per_m * (self.position_gain_per_s + 1.0 / self.velocity_integral_time_s)
+    }
 }
 
 keys! {

@@ -64,6 +64,9 @@ section! {
         pub contact_n: f64 = 10.0 => Positive,
         /// Largest desired bite force.
         pub peak_n: f64 = 30.0 => "`contact_n` to 1000",
+        /// Bite force, as a share of `peak_n`, above which the run ends in a safe stop (`force_limit`). The drives of the legs
+        /// get a limit (6072h) of this force and 60 N for the jaw itself.
+        pub overload: f64 = 1.5 => Within(1.1, 10.0),
         /// Duration of a bite.
         pub bite_s: f64 = 0.3 => Positive,
         /// Admittance: force error per closing speed, with food between the teeth.
@@ -87,6 +90,24 @@ section! {
 impl ForceControlConfig {
     /// Time constant of the admittance, virtual mass by damping, s.
     pub const MASS_TIME_S: f64 = 0.003;
+
+    /// Room in the force limit of a leg's drive for weight, friction and acceleration of the jaw, N.
+    const OF_JAW_N: f64 = 60.0;
+
+    /// The bite force above which a run ends, N.
+    pub fn limit_n(&self) -> f64 {
+        self.overload * self.peak_n
+    }
+
+    /// The force limit of a leg's drive, N. A bite within the triangle of the balls loads no leg with more than its force.
+    pub(super) fn limit_of_leg_n(&self) -> f64 {
+        self.limit_n() + Self::OF_JAW_N
+    }
+
+    /// The delay of the loop, s, with a lead (s) and the delay of an observer or a load cell (s).
+    pub fn delay_s(lead_s: f64, source_s: f64) -> f64 {
+        lead_s + source_s + Self::MASS_TIME_S
+    }
 
     /// The least damping for a stable loop against a stiffness k (N/m) with a delay t (s), N per m/s: 2/π k t. This is
     /// the limit of a pure delay; the lags of the rig turn the phase less.
@@ -114,7 +135,7 @@ impl ForceControlConfig {
     pub(super) fn validate(&self, lead_s: f64, source_s: f64) -> Checked {
         self.check_ranges(ranges_of("force_control"))?;
         require_range("force_control.peak_n", Range::Within(self.contact_n, 1000.0), self.peak_n)?;
-        let delay_s = lead_s + source_s + Self::MASS_TIME_S;
+        let delay_s = Self::delay_s(lead_s, source_s);
         let Self { damping_n_s_per_m, food_stiffness_n_per_m, tooth_damping_n_s_per_m, .. } = *self;
         for (key, damping, stiffness) in [
             ("damping_n_s_per_m", damping_n_s_per_m, food_stiffness_n_per_m),

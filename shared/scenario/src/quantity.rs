@@ -92,7 +92,7 @@ pub const UNITS: [Unit; 34] = {
         unit("kg", D::Mass, 1.0),
         unit("g", D::Mass, 1e-3),
         unit("W", D::Power, 1.0),
-        unit("J", D::Energy, 1.0),
+        Unit::J,
         unit("m2", D::Area, 1.0),
         Unit::MM2,
         unit("Pa", D::Pressure, 1.0),
@@ -119,6 +119,8 @@ impl Unit {
     pub const MS: Self = Self { name: "ms", dimension: Dimension::Time, si: 1e-3 };
     /// Microseconds.
     pub const US: Self = Self { name: "us", dimension: Dimension::Time, si: 1e-6 };
+    /// Joules.
+    pub const J: Self = Self { name: "J", dimension: Dimension::Energy, si: 1.0 };
     /// Square millimetres.
     pub const MM2: Self = Self { name: "mm2", dimension: Dimension::Area, si: 1e-6 };
     /// Megapascals.

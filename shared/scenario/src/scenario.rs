@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use masseter_model::geometry::{AXES, AXIS_NAMES, MechanismConfig};
+use masseter_model::geometry::{AXES, AXIS_NAMES, LEGS, MechanismConfig};
 use toml::Table;
 
 use super::document::{Document, malformed, value_at};
@@ -396,11 +396,35 @@ impl Scenario {
         }
         if let Some(control) = &self.force_control {
             let cell = control.cell(self.load_cell.as_ref(), self.can.is_virtual())?;
-            let source_s = cell.map_or(estimate.observer_time_s, LoadCellConfig::time_s);
-            control.validate(self.controller.lead_cycles * self.period_s(), source_s)?;
+            control.validate(self.lead_s(), self.source_s(control))?;
             cell.map_or(Ok(()), |cell| cell.require_for(control))?;
         }
         if self.is_force_estimated() { dynamics::require_open_screws(&self.model().friction) } else { Ok(()) }
+    }
+
+    /// Time from a sample until the drives have followed the command that answers it, s.
+    fn lead_s(&self) -> f64 {
+        self.controller.lead_cycles * self.period_s()
+    }
+
+    /// Delay of the force that this control has, s.
+    pub fn source_s(&self, control: &ForceControlConfig) -> f64 {
+        match (control.source, &self.load_cell) {
+            (ForceSource::LoadCell, Some(cell)) => cell.time_s(),
+            _ => self.force_estimate.unwrap_or_default().observer_time_s,
+        }
+    }
+
+    /// Delay of the loop of this control, s.
+    pub fn force_delay_s(&self, control: &ForceControlConfig) -> f64 {
+        ForceControlConfig::delay_s(self.lead_s(), self.source_s(control))
+    }
+
+    /// The force limit of the drive of an axis (6072h), N: in force control that of a leg depends on the bite force.
+    pub fn max_force_n(&self, axis: usize) -> f64 {
+        let of_bite = self.force_control.filter(|_| axis >= LEGS).map(|control| control.limit_of_leg_n());
+        let most_n = self.drives.of_axis(axis).max_force_n.min(of_bite.unwrap_or(f64::INFINITY));
+        most_n * self.dry.force_now()
     }
 
     /// Whether the bite force is estimated: for the scenario's own request, or for the force control.

@@ -22,8 +22,9 @@ use std::ops::Range;
 use masseter_can::canopen::Cob;
 use masseter_can::{CanId, ErrorState, Frame};
 use masseter_drives::{DriveFault, DriveNode, DriveSettings, HeldMean};
+use masseter_model::dynamics::Energy;
 use masseter_model::geometry::{AXES, Mechanism};
-use masseter_runtime::messages::{Contact, Truth, pose_fields};
+use masseter_runtime::messages::{Contact, Truth, WORKS, pose_fields};
 use masseter_scenario::{self as scenario, AxisFault, FaultKindConfig, Scenario};
 use nalgebra::Translation3;
 
@@ -108,6 +109,8 @@ struct Sample {
     bite_force_n: [f64; 2],
     /// Value of the load cell; 0 without one.
     load_cell_n: f64,
+    /// The ledger of energy.
+    work_j: [f64; WORKS],
 }
 
 impl Emulation {
@@ -150,6 +153,7 @@ impl Emulation {
                 force_n: [[0.0; AXES]; 2],
                 bite_force_n: [0.0; 2],
                 load_cell_n: 0.0,
+                work_j: [0.0; WORKS],
             },
             dynamics,
             step_ns,
@@ -187,18 +191,22 @@ impl Emulation {
 
     /// The mechanism's motion at the last SYNC.
     pub fn truth(&self) -> Truth {
-        let Sample { time_ns, state, force_n, bite_force_n, .. } = self.sample;
+        let Sample { time_ns, state, force_n, bite_force_n, work_j, .. } = self.sample;
+        let (joint_m_s, Energy { kinetic_j, potential_j }) = self.dynamics.motion_and_energy(&state);
         let (position_m, quaternion_wxyz) = pose_fields(&state.pose);
         Truth {
             sampled_ns: time_ns,
             position_m,
             quaternion_wxyz,
             joint_m: state.positions_m(),
-            joint_m_s: self.dynamics.velocities_m_s(&state),
+            joint_m_s,
             force_n: force_n[0],
             force_sample_n: force_n[1],
             bite_force_n: bite_force_n[0],
             bite_force_sample_n: bite_force_n[1],
+            work_j,
+            kinetic_j,
+            potential_j,
             ..Truth::default()
         }
     }
@@ -387,6 +395,7 @@ impl Emulation {
                 ],
                 bite_force_n: [self.bite_force_n.take_mean(now_ns), self.bite_force_n.value],
                 load_cell_n: self.load_cell.as_mut().map_or(0.0, LoadCell::read),
+                work_j: self.dynamics.ledger.work_j,
             };
             if let Some(contact) = &mut self.contact {
                 *contact = Contact { sampled_ns: now_ns, ..self.dynamics.occlusion.take_mean() };

@@ -64,6 +64,9 @@ pub(super) struct AxisMotion {
 pub(super) struct AxesForces {
     /// Forces on the moving bodies at constant speeds, with those of the drives, N.
     pub(super) force_n: Vector6<f64>,
+    /// The parts of these that the drives and friction have.
+    pub(super) driven: [Element; AXES],
+    pub(super) braked: [Element; AXES],
     /// Mass of the drives' sides, which the axes do not move, kg.
     pub(super) parted_kg: Vector6<f64>,
     /// Resistance to a change of the axes' speeds, like a mass, kg.
@@ -125,20 +128,30 @@ impl Axes {
     ) -> AxesForces {
         let mut forces = AxesForces {
             force_n: Vector6::zeros(),
+            driven: [Element::default(); AXES],
+            braked: [Element::default(); AXES],
             parted_kg: Vector6::zeros(),
             resisting_kg: Vector6::zeros(),
         };
         let coulomb_n = braking.coulomb_n();
         for (number, axis) in self.each.iter_mut().enumerate() {
             let motion = AxisMotion { position_m: positions_m[number], speed_m_s: speeds_m_s[number] };
-            let mut element = axis.act(drives_n[number], motion, step_s);
-            element +=
+            let driven = axis.coupling.push(drives_n[number], motion.position_m, motion.speed_m_s, step_s);
+            let braked =
                 braking.on_axis(number, coulomb_n[number], motion.speed_m_s, axis.faults.friction, step_s);
+            let mut element = axis.act(driven, motion, step_s);
+            element += braked;
+            (forces.driven[number], forces.braked[number]) = (driven, braked);
             forces.force_n[number] = element.force_n;
             forces.parted_kg[number] = axis.coupling.parted_kg();
             forces.resisting_kg[number] = element.damping_n_s_per_m * step_s;
         }
         forces
+    }
+
+    /// Mass of the drives' sides, which the axes do not move, kg.
+    pub(super) fn parted_kg(&self) -> Vector6<f64> {
+        Vector6::from_fn(|axis, _| self.each[axis].coupling.parted_kg())
     }
 
     /// Solves the drives' sides for a step at whose end the axes have these speeds, m/s.
@@ -178,14 +191,13 @@ impl Axis {
         }
     }
 
-    /// The force on the axis in a step, without friction.
+    /// The force on the axis in a step, with that of its drive and without friction.
     fn act(
         &mut self,
-        drive_n: f64,
+        mut element: Element,
         AxisMotion { position_m, speed_m_s }: AxisMotion,
         step_s: f64,
     ) -> Element {
-        let mut element = self.coupling.push(drive_n, position_m, speed_m_s, step_s);
         if let Some(seizure) = &mut self.seizure {
             element += seizure.hold(position_m, speed_m_s, step_s);
         }

@@ -18,15 +18,14 @@ mod tests;
 
 use std::ops::AddAssign;
 
-use masseter_model::dynamics::{Bodies, DynamicsConfig, Equations, Motion, Reactions};
-use masseter_model::geometry::{
-    AXES, Actuators, Jacobian, LEGS, Mechanism, Pose, Twist, Vec3, frame_of_corners,
-};
+use masseter_model::dynamics::{Bodies, DynamicsConfig, Energy, Equations, Motion, Reactions};
+use masseter_model::geometry::{AXES, Actuators, LEGS, Mechanism, Pose, Twist, Vec3, frame_of_corners};
 use nalgebra::{Matrix3, Matrix6, Quaternion, Translation3, UnitQuaternion, Vector6};
 
 use super::axes::{Axes, AxesForces, AxisFaults, AxisMotion};
 use super::contact::Occlusion;
 use super::friction::Braking;
+use super::ledger::{Ledger, StepForces};
 use crate::error::DynamicsError;
 use crate::state::state;
 
@@ -59,12 +58,15 @@ pub(crate) struct Dynamics {
     braking: Braking,
     pub(crate) axes: Axes,
     pub(crate) load: Load,
+    pub(crate) ledger: Ledger,
+    /// Energy of height at the start, J.
+    start_j: f64,
 }
 
 state!(Dynamics {
-    values: state acceleration occlusion axes load;
+    values: state acceleration occlusion axes load ledger;
     parts: braking;
-    constant: mechanism config bodies;
+    constant: mechanism config bodies start_j;
 });
 
 impl Dynamics {
@@ -89,6 +91,8 @@ impl Dynamics {
             braking: Braking::new(config, &bodies),
             axes: Axes::new(&config.axes, &mechanism, state.positions_m(), &bodies.axis_mass_kg()),
             load: Load::new(Vec3::from(incisal_m)),
+            ledger: Ledger::default(),
+            start_j: Energy::new(&bodies, &motion).potential_j,
             mechanism,
             config: *config,
             bodies,
@@ -116,10 +120,24 @@ impl Dynamics {
         self.axes.drive_positions_m(self.state.positions_m())
     }
 
-    /// Joint velocities in a state, m/s. Their computation costs more than a step, so it is not part of a step.
-    pub(crate) fn velocities_m_s(&self, state: &MechanismState) -> [f64; AXES] {
-        let legs = self.mechanism.legs(&state.pose).expect("a pose that was reached has joints");
-        (Jacobian::of_legs(&self.mechanism, &legs).actuators * state.twist).into()
+    /// The motion of a state: with joint velocities, whose computation costs more than a step and is no part of a step.
+    fn motion_of(&self, state: &MechanismState) -> Motion {
+        Motion::new(&self.mechanism, &state.pose, &state.twist).expect("a pose that was reached has joints")
+    }
+
+    /// Joint velocities in a state, m/s, and the energy of the bodies that the axes move; that of height since the start.
+    pub(crate) fn motion_and_energy(&self, state: &MechanismState) -> ([f64; AXES], Energy) {
+        let motion = self.motion_of(state);
+        let speeds_m_s = motion.rates_m_s;
+        let energy = Energy::new(&self.bodies, &motion);
+        let parted_j = 0.5 * self.axes.parted_kg().dot(&speeds_m_s.component_mul(&speeds_m_s));
+        let (kinetic_j, potential_j) = (energy.kinetic_j - parted_j, energy.potential_j - self.start_j);
+        (speeds_m_s.into(), Energy { kinetic_j, potential_j })
+    }
+
+    /// Joint velocities in a state, m/s.
+    fn velocities_m_s(&self, state: &MechanismState) -> [f64; AXES] {
+        self.motion_of(state).rates_m_s.into()
     }
 
     /// Applies the actuators' forces (N) for the step that begins.
@@ -136,15 +154,22 @@ impl Dynamics {
         let moved_kg = forces.resisting_kg - forces.parted_kg;
         let Equations { mut mass, bias, .. } = Equations::with_added(&self.bodies, &motion, &moved_kg);
         let axes_n = forces.force_n + forces.parted_kg.component_mul(&bias_m_s2);
-        let wrench = actuators.tr_mul(&axes_n) - joints * twist
-            + contact
-            + self.load.wrench(&motion.pose, &motion.twist, self.config.gravity_m_s2)
-            - bias;
+        let load = self.load.wrench(&motion.pose, &motion.twist, self.config.gravity_m_s2);
+        let wrench = actuators.tr_mul(&axes_n) - joints * twist + contact + load - bias;
         mass += joints * step_s;
-        if let Some(payload) = self.load.mass(&motion.pose) {
+        let payload = self.load.mass(&motion.pose);
+        if let Some(payload) = payload {
             mass += payload;
         }
         self.acceleration = mass.cholesky().ok_or(DynamicsError::Mass)?.solve(&wrench);
+        let acceleration = self.acceleration;
+        let forces_on_bodies = StepForces {
+            axes: &forces,
+            joints: joints * -(twist + acceleration * step_s),
+            contact,
+            others: load - payload.map_or(Vector6::zeros(), |payload| payload * acceleration),
+        };
+        self.ledger.begin(&forces_on_bodies, &motion, &twist, &acceleration, step_s);
         self.end_step(&motion, &speeds_m_s, &forces);
         Ok(())
     }
@@ -172,6 +197,7 @@ impl Dynamics {
         let twist = self.state.twist + self.acceleration * dt_s;
         self.state = MechanismState { pose, twist, actuators: self.mechanism.actuators(&pose)? };
         self.axes.advance(dt_s);
+        self.ledger.advance(dt_s);
         Ok(())
     }
 

@@ -129,6 +129,11 @@ pub(super) struct Element {
 }
 
 impl Element {
+    /// The force at the end of a step in which the speed changes by that much, N.
+    pub(super) fn after_n(&self, change_m_s: f64) -> f64 {
+        self.force_n - self.damping_n_s_per_m * change_m_s
+    }
+
     /// A spring with a damper that is stretched by `stretch_m` now, at a speed, for a step.
     pub(super) fn spring(spring: Spring, stretch_m: f64, speed_m_s: f64, step_s: f64) -> Self {
         let Spring { stiffness_n_per_m, damping_n_s_per_m } = spring;

@@ -8,4 +8,5 @@ pub(crate) mod contact;
 mod coupling;
 pub(crate) mod dynamics;
 mod friction;
+pub(crate) mod ledger;
 mod stops;

@@ -7,7 +7,7 @@ numpy.dtype(Reading) is the NumPy type of a message.
 import ctypes
 import enum
 
-LAYOUT_VERSION = 14
+LAYOUT_VERSION = 15
 #: Event.axis when no axis is concerned.
 NO_AXIS = 4294967295
 #: Reading.drive_state of a drive not heard of yet, or lost.
@@ -206,6 +206,8 @@ class Cause(enum.IntEnum):
     END_STOP_HIT = 62
     #: A drive acknowledged a value and shows another one (value that it shows; the limit is the one written).
     NOT_KEPT = 63
+    #: The bite force exceeds the limit of the force control (N).
+    FORCE_LIMIT = 64
     #: The motion waited too long for lost or late commands and readings (s).
     MOTION_LATE = 65
 
@@ -280,7 +282,7 @@ class Reading(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Reading/9d8ad5ebfa25365a"
+        return "masseter/Reading/62dfc6bcca479392"
 
 
 _check(Reading, 264, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 176, 224, 232, 256, 260])
@@ -313,7 +315,7 @@ class Command(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Command/aa9ccbb5a914f2fa"
+        return "masseter/Command/f5b88debf7e601e0"
 
 
 _check(Command, 144, [0, 8, 16, 24, 32, 40, 88, 136, 140])
@@ -380,7 +382,7 @@ class State(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/State/d4676753f03c0750"
+        return "masseter/State/2e7a5131035419cc"
 
 
 _check(State, 296, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 136, 160, 192, 216, 248, 272, 280, 288, 292])
@@ -427,7 +429,7 @@ class Event(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Event/74061a7c3e4137f5"
+        return "masseter/Event/9ef3b315edc5cd35"
 
 
 _check(Event, 88, [0, 8, 16, 24, 32, 40, 44, 48, 52, 56, 60, 62, 64, 68, 72, 80])
@@ -464,14 +466,20 @@ class Truth(ctypes.Structure):
         ("bite_force_n", ctypes.c_double),
         # Bite force at the sample, N.
         ("bite_force_sample_n", ctypes.c_double),
+        # Work on the bodies since the start, J: of the drives, of friction in slides, legs, and hinges with balls, of teeth and food, of everything else (pushes, payload, end stops).
+        ("work_j", ctypes.c_double * 6),
+        # Energy of the bodies' motion, J.
+        ("kinetic_j", ctypes.c_double),
+        # Energy of their height above that of the start, J.
+        ("potential_j", ctypes.c_double),
     ]
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Truth/fa288e2ecf0cfeb2"
+        return "masseter/Truth/1f4bd7c5b12a8199"
 
 
-_check(Truth, 304, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240, 288, 296])
+_check(Truth, 368, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240, 288, 296, 304, 352, 360])
 
 
 class Contact(ctypes.Structure):
@@ -499,7 +507,7 @@ class Contact(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Contact/0b914d25db656913"
+        return "masseter/Contact/23e17f519c62e157"
 
 
 _check(Contact, 872, [0, 8, 16, 24, 32, 40, 104, 488])

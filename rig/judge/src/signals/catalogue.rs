@@ -5,6 +5,7 @@
 use masseter_controller::trajectory::recorded_signals;
 use masseter_model::geometry::{AXES, AXIS_NAMES, Vec3};
 use masseter_runtime::messages::codes::{ControllerState, DriveRequest, DriveState, NO_DRIVE_STATE};
+use masseter_runtime::messages::{Truth, WORKS};
 use masseter_runtime::named::{Declared, PlayedMotion};
 use masseter_scenario::{MotionConfig, Scenario, Unit};
 
@@ -26,6 +27,7 @@ pub(super) fn signals(scenario: &Scenario, jaw: Jaw, declared: &Declared) -> Vec
         .truth_if(true);
     }
     add_axes(&mut list, jaw.has_truth);
+    add_energy(&mut list);
     add_controller(&mut list);
     add_timing(&mut list);
     add_declared(&mut list, declared);
@@ -208,6 +210,35 @@ fn add_axes(list: &mut SignalList, has_truth: bool) {
         list.add_state(format!("{name}.drive"), "State of the drive.", states, move |of| {
             Some(reading(of)?.drive_state[axis])
         });
+    }
+}
+
+/// The ledger of energy of the emulated mechanism: work since the start, and where it is.
+fn add_energy(list: &mut SignalList) {
+    let works: [(&str, &str); WORKS] = [
+        ("motors", "Work of the drives"),
+        ("friction.slides", "Work of the friction of the slides"),
+        ("friction.legs", "Work of the friction of the legs"),
+        ("friction.joints", "Work of the friction of hinges and balls"),
+        ("contact", "Work of teeth and food"),
+        ("others", "Work of pushes, payload, end stops and seized guides"),
+    ];
+    for (kind, (name, about)) in works.into_iter().enumerate() {
+        let about = format!("{about} on the mechanism since the start.");
+        list.add(format!("energy.{name}"), Unit::J, about, move |of| Some(of.truth?.work_j[kind]))
+            .truth_if(true);
+    }
+    let stored: [(&str, &str, fn(&Truth) -> f64); 3] = [
+        ("kinetic", "Energy of the mechanism's motion.", |truth| truth.kinetic_j),
+        ("potential", "Energy of the mechanism's height above that of the start.", |truth| truth.potential_j),
+        (
+            "gap",
+            "Energy without work: kinetic and potential energy less all work. 0 but for the step of the simulation.",
+            |truth| truth.kinetic_j + truth.potential_j - truth.work_j.iter().sum::<f64>(),
+        ),
+    ];
+    for (name, about, value) in stored {
+        list.add(format!("energy.{name}"), Unit::J, about, move |of| Some(value(&of.truth?))).truth_if(true);
     }
 }
 

@@ -13,6 +13,7 @@
 //! ```
 
 mod placement;
+mod stiffness;
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -96,7 +97,7 @@ impl RunPlan {
     }
 
     /// What a user should look at before the results: a file without the marker's offset, doubtful rows, guides that can lock,
-    /// what the rig does not take from files of drives.
+    /// what the rig does not take from files of drives, a stiffness stated for the force control that is far from the real one.
     pub fn warnings(&self) -> Vec<String> {
         let centroid = self.trajectory.centroid_turn_deg().map(|turn_deg| {
             format!(
@@ -106,7 +107,8 @@ impl RunPlan {
         });
         let doubts = self.trajectory.doubts().into_iter().map(|doubt| format!("the motion's {doubt}"));
         let of_files = self.scenario.drive_profile.iter().filter_map(DriveProfile::dcf_warning);
-        centroid.into_iter().chain(doubts).chain(self.locking()).chain(of_files).collect()
+        let stiffness = stiffness::warnings(&self.scenario, &self.mechanism, &self.trajectory.closed_pose());
+        centroid.into_iter().chain(doubts).chain(self.locking()).chain(of_files).chain(stiffness).collect()
     }
 
     /// A line that describes the run, and one for each warning.

@@ -43,11 +43,13 @@
 //! ```
 
 mod bodies;
+mod energy;
 mod equations;
 mod friction;
 mod parameters;
 
 pub use bodies::{Bodies, JointAccelerations, Link, Motion, Platform};
+pub use energy::Energy;
 pub use equations::{Equations, JointWrench, LegReactions, Reactions};
 pub use friction::{Friction, Loads};
 pub use parameters::{AxesConfig, DynamicsConfig, FrictionConfig, FrictionModel};

@@ -6,11 +6,6 @@ use proptest::prelude::*;
 use super::*;
 use crate::geometry::{LEGS, Mechanism, MechanismConfig, Pose, Twist, Vec3};
 
-#[path = "../../tests/energy/mod.rs"]
-mod energy;
-
-use energy::Energy;
-
 fn mechanism() -> Mechanism {
     Mechanism::new(&MechanismConfig::default()).unwrap()
 }

@@ -198,6 +198,8 @@ codes! {
         EndStopHit = 62 "end_stop_hit",
         /// A drive acknowledged a value and shows another one (value that it shows; the limit is the one written).
         NotKept = 63 "not_kept",
+        /// The bite force exceeds the limit of the force control (N).
+        ForceLimit = 64 "force_limit",
         /// The motion waited too long for lost or late commands and readings (s).
         MotionLate = 65 "motion_late",
     }

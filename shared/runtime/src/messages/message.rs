@@ -8,14 +8,14 @@ use masseter_can::Frame;
 use super::codes;
 
 /// Version of the layouts of all messages. The version changes with any layout, and with the meaning of a field.
-pub const LAYOUT_VERSION: u64 = 14;
+pub const LAYOUT_VERSION: u64 = 15;
 /// Room for the data bytes of frames of other formats too.
 const MOST_BYTES: usize = 64;
 /// Most numbers in a message.
 pub const MOST_VALUES: usize = 64;
 /// The endings of names with their units. Of two that fit, the first counts.
-const UNITS: [(&str, &str); 6] =
-    [("_m_s", "m/s"), ("_ns", "ns"), ("_m", "m"), ("_s", "s"), ("_n", "N"), ("_rad", "rad")];
+const UNITS: [(&str, &str); 7] =
+    [("_m_s", "m/s"), ("_ns", "ns"), ("_m", "m"), ("_s", "s"), ("_n", "N"), ("_rad", "rad"), ("_j", "J")];
 
 /// The type of the messages of a topic.
 pub trait Message: Pod + ZeroCopySend + Default + std::fmt::Debug + PartialEq {

@@ -33,9 +33,12 @@ pub use words::explain;
 /// and the signals of a controller keep every bit.
 const ZERO_BITS: u32 = 22;
 
+/// Kinds of forces in [`Truth::work_j`].
+pub const WORKS: usize = 6;
+
 messages! {
     /// Targets and request for the drives, once a cycle.
-    Command on "command" keeping 2048 as "masseter/Command/aa9ccbb5a914f2fa" {
+    Command on "command" keeping 2048 as "masseter/Command/f5b88debf7e601e0" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -52,7 +55,7 @@ messages! {
     }
 
     /// Positions, forces and states of the drives, once a cycle.
-    Reading on "reading" keeping 2048 as "masseter/Reading/9d8ad5ebfa25365a" {
+    Reading on "reading" keeping 2048 as "masseter/Reading/62dfc6bcca479392" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// Cycle of the last command received when the sample was taken; 0 before the first.
@@ -95,7 +98,7 @@ messages! {
     }
 
     /// The controller's state and its estimate, once a cycle. All float64 fields but `motion_time_s` have 31 significant bits.
-    State on "state" keeping 2048 as "masseter/State/d4676753f03c0750" {
+    State on "state" keeping 2048 as "masseter/State/2e7a5131035419cc" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -149,7 +152,7 @@ messages! {
 
     /// The signals that the controller declares, once a cycle; without any, there is no such message. A recording's
     /// definition of the message has a field for each signal.
-    Signals on "signal" keeping 2048 as "masseter/Signals/d83baba07ded40e5" {
+    Signals on "signal" keeping 2048 as "masseter/Signals/3a320ce75848db5b" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The signals, in the order of their declaration.
@@ -158,7 +161,7 @@ messages! {
 
     /// The parameters that the controller declares, in its first cycle and in each that begins with another value. A
     /// recording's definition of the message has a field for each parameter.
-    Parameters on "parameter" keeping 256 as "masseter/Parameters/97ac3b560ac142e5" {
+    Parameters on "parameter" keeping 256 as "masseter/Parameters/3d4e43c1a8895345" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The parameters, in the order of their declaration.
@@ -167,7 +170,7 @@ messages! {
 
     /// The true state of the mechanism, once a cycle; the controller never reads it. All float64 fields have 31
     /// significant bits.
-    Truth on "truth" keeping 2048 as "masseter/Truth/fa288e2ecf0cfeb2" {
+    Truth on "truth" keeping 2048 as "masseter/Truth/1f4bd7c5b12a8199" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// The instant it describes: that of the reading's sample, ns.
@@ -188,11 +191,18 @@ messages! {
         bite_force_n: f64,
         /// Bite force at the sample, N.
         bite_force_sample_n: f64,
+        /// Work on the bodies since the start, J: of the drives, of friction in slides, legs, and hinges with balls, of teeth and
+        /// food, of everything else (pushes, payload, end stops).
+        work_j: [f64; WORKS],
+        /// Energy of the bodies' motion, J.
+        kinetic_j: f64,
+        /// Energy of their height above that of the start, J.
+        potential_j: f64,
     }
 
     /// The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads
     /// it. All float64 fields have 31 significant bits.
-    Contact on "contact" keeping 2048 as "masseter/Contact/0b914d25db656913" {
+    Contact on "contact" keeping 2048 as "masseter/Contact/23e17f519c62e157" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// End of the time that it describes: the instant of the reading's sample, ns.
@@ -206,7 +216,7 @@ messages! {
     }
 
     /// An observation of a tap on a CAN wire: a frame, or an error message in the coding of `linux/can/error.h`.
-    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/1056c1b9c32a18b2" {
+    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/166f39553be78794" {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
         /// When its transmitter had it queued, ns; 0 on real wires.
@@ -223,7 +233,7 @@ messages! {
 
     /// Counters of the kernel for the machine and both loops. The recorder reads and records them; the message is not
     /// published.
-    Machine on "machine" keeping 1 as "masseter/Machine/4fba74519f6848e4" {
+    Machine on "machine" keeping 1 as "masseter/Machine/101b41e8c4dbfc2e" {
         /// Time of the sample, ns.
         time_ns: u64,
         /// Time that the hypervisor had taken from all cores together, as far as the hypervisor reports it, ns.
@@ -235,7 +245,7 @@ messages! {
     }
 
     /// A single occurrence: a change of state, a fault, an alarm.
-    Event on "event" keeping 1024 as "masseter/Event/74061a7c3e4137f5" {
+    Event on "event" keeping 1024 as "masseter/Event/9ef3b315edc5cd35" {
         /// When, ns.
         time_ns: u64,
         /// Cycle of the process that reports it.
@@ -322,6 +332,8 @@ impl Truth {
         round_figures(&mut self.force_n);
         round_figures(&mut self.force_sample_n);
         round_figures([&mut self.bite_force_n, &mut self.bite_force_sample_n]);
+        round_figures(&mut self.work_j);
+        round_figures([&mut self.kinetic_j, &mut self.potential_j]);
     }
 }
 

@@ -44,7 +44,7 @@ fn names_in_shared_memory_carry_the_hash_of_the_layout() {
 fn the_hash_covers_version_fields_data_bytes_and_codes() {
     let layout = layout::<FrameTap>();
     for (found, other) in
-        [("v14", "v15"), ("queued_ns", "waiting_ns"), ("[<=64]", "[<=8]"), ("fault=8", "fault=9")]
+        [("v15", "v16"), ("queued_ns", "waiting_ns"), ("[<=64]", "[<=8]"), ("fault=8", "fault=9")]
     {
         let changed = layout.replace(found, other);
         assert_ne!((hash(&layout), &layout), (hash(&changed), &changed));

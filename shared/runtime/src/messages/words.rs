@@ -23,6 +23,7 @@ fn place_of(event: &Event, interface: Option<&str>) -> String {
     let bus = interface.map_or_else(|| bus.to_string(), |name| format!("{bus}, {name}"));
     match (AXIS_NAMES.get(event.axis as usize), node) {
         _ if event.cause == Cause::LawFailed.code() => "the pose law".to_owned(),
+        _ if event.cause == Cause::ForceLimit.code() => "the bite".to_owned(),
         _ if event.cause == Cause::MotionLate.code() => "the motion".to_owned(),
         _ if event.cause == Cause::FoodBroke.code() => format!("tooth {}", event.object),
         (None, 0) if event.source == Source::Controller.code() => "the mechanism".to_owned(),
@@ -181,6 +182,10 @@ fn words_of_run(cause: Cause, event: &Event, interface: Option<&str>) -> Option<
             };
             what + "; see the message of your controller"
         }
+        Cause::ForceLimit => format!(
+            "{value:.1} N, limit {limit:.1} N; close more slowly, state the stiffness of food and teeth in [force_control], \
+             or raise its overload"
+        ),
         Cause::ForwardKinematics => format!(
             "{}; compare what the encoders count with the rig, and the rig with the scenario's [mechanism]",
             no_pose(NoPose::try_from(event.object).ok()?)

@@ -6,11 +6,6 @@ use masseter_model::geometry::MechanismConfig;
 use super::*;
 use crate::simulator::emulation::jaw::occlusion;
 
-#[path = "../../../../../shared/model/tests/energy/mod.rs"]
-mod energy;
-
-use energy::Energy;
-
 fn at_rest(config: &DynamicsConfig) -> Dynamics {
     let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
     Dynamics::new(
@@ -189,6 +184,51 @@ fn work_of_the_axes_is_all_the_energy_gains_even_in_a_tumble() {
     let work_j: f64 = moved_m.zip(force_n).map(|(moved_m, force_n)| moved_m * force_n).sum();
     let gained_j = energy(&dynamics).total_j() - start_j;
     assert!((gained_j - work_j).abs() < 1e-4, "work {work_j} J, gained {gained_j} J of {start_j} J");
+}
+
+/// Energy without work, and what the drives have done, J.
+fn gap_and_motors_j(dynamics: &Dynamics) -> [f64; 2] {
+    let work_j = dynamics.ledger.work_j;
+    let (_, energy) = dynamics.motion_and_energy(&dynamics.state);
+    [energy.total_j() - work_j.iter().sum::<f64>(), work_j[0]]
+}
+
+/// Springs and dampers as drives swing the jaw with a payload at 2 Hz; steps are cut, as SYNCs cut them.
+#[test]
+fn the_ledger_of_every_cycle_closes_within_a_thousandth_with_any_friction_and_play() {
+    for model in [FrictionModel::None, FrictionModel::Smooth, FrictionModel::Lugre] {
+        for leg_play_m in [0.0, 5e-5] {
+            let friction = FrictionConfig { model, ..FrictionConfig::default() };
+            let axes = AxesConfig { leg_play_m, ..AxesConfig::default() };
+            let mut dynamics = at_rest(&DynamicsConfig { friction, axes, ..DynamicsConfig::default() });
+            dynamics.load.payload_kg = 0.3;
+            let start_m = dynamics.state.positions_m();
+            for cycle in 0..4 {
+                let (before_j, mut turned_over_j) = (gap_and_motors_j(&dynamics), 0.0);
+                for step in 0..4000 {
+                    let phase = std::f64::consts::TAU * f64::from(step) / 4000.0;
+                    let positions_m = dynamics.drive_positions_m();
+                    let speeds_m_s = dynamics.velocities_m_s(&dynamics.state);
+                    let force_n = std::array::from_fn(|axis| {
+                        let target_m = start_m[axis] + 5e-3 * (phase + axis as f64).sin() * phase.min(1.0);
+                        2e4 * (target_m - positions_m[axis]) - 100.0 * speeds_m_s[axis]
+                    });
+                    let motors_j = dynamics.ledger.work_j[0];
+                    dynamics.push(&force_n).unwrap();
+                    let step_s = dynamics.step_s();
+                    for share in [0.3, 0.7] {
+                        dynamics.advance(share * step_s).unwrap();
+                    }
+                    turned_over_j += (dynamics.ledger.work_j[0] - motors_j).abs();
+                }
+                let gap_j = gap_and_motors_j(&dynamics)[0] - before_j[0];
+                println!("{model:?}, play {leg_play_m}, cycle {cycle}: {gap_j:e} J of {turned_over_j} J");
+                assert!(gap_j.abs() <= 1e-3 * turned_over_j, "{model:?} {leg_play_m}");
+            }
+            let is_lost = dynamics.ledger.work_j[1..4].iter().all(|work_j| *work_j < 0.0);
+            assert_eq!(is_lost, model != FrictionModel::None, "{:?}", dynamics.ledger);
+        }
+    }
 }
 
 #[test]

@@ -73,6 +73,15 @@ pub(super) fn motion_section(scenario: &Scenario, figures: &Figures) -> Section 
         let force = Chart { series, ..Chart::over_time("Bite force, vertical", "N") };
         blocks.push(Block::chart("bite", force));
     }
+    if figures.tracking.actual_source.is_truth() {
+        let names = ["drives", "friction", "food, teeth and others", "motion and height: their sum"];
+        let series = names.iter().zip(&over_time.energy_j).map(|(name, curve)| plain(name, curve, 1.0));
+        let energy = Chart {
+            series: series.collect(),
+            ..Chart::over_time("Work on the mechanism since the start", "J")
+        };
+        blocks.push(Block::chart("energy", energy));
+    }
     Section::new("motion", "Motion", blocks)
 }
 

@@ -1,20 +1,22 @@
-//! The mechanical energy of the bodies, body by body. Tests of the model and of the plant include this file.
+//! The mechanical energy of the bodies, body by body, without the equations of motion.
 
 use nalgebra::Vector3;
 
-use super::{Bodies, LEGS, Motion};
+use super::bodies::{Bodies, Motion};
+use crate::geometry::LEGS;
 
 /// Energy of all bodies, J.
-pub(super) struct Energy {
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Energy {
     /// Energy of motion, J.
-    pub(super) kinetic_j: f64,
+    pub kinetic_j: f64,
     /// Energy of height; 0 with every centre of mass in the base plane, J.
-    pub(super) potential_j: f64,
+    pub potential_j: f64,
 }
 
 impl Energy {
     /// The energy of bodies in a motion.
-    pub(super) fn new(bodies: &Bodies, motion: &Motion) -> Self {
+    pub fn new(bodies: &Bodies, motion: &Motion) -> Self {
         let mut energy = Self::of_platform(bodies, motion);
         let Bodies { carriage_kg, cylinder, rod, gravity_m_s2, .. } = *bodies;
         for leg in 0..LEGS {
@@ -38,7 +40,7 @@ impl Energy {
     }
 
     /// Kinetic and potential energy together, J.
-    pub(super) fn total_j(&self) -> f64 {
+    pub fn total_j(&self) -> f64 {
         self.kinetic_j + self.potential_j
     }
 
