@@ -282,7 +282,7 @@ class Reading(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Reading/62dfc6bcca479392"
+        return "masseter/Reading/605122f0cec28ded"
 
 
 _check(Reading, 264, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 176, 224, 232, 256, 260])
@@ -315,7 +315,7 @@ class Command(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Command/f5b88debf7e601e0"
+        return "masseter/Command/56470557c10ef10b"
 
 
 _check(Command, 144, [0, 8, 16, 24, 32, 40, 88, 136, 140])
@@ -382,7 +382,7 @@ class State(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/State/2e7a5131035419cc"
+        return "masseter/State/a728e9829bcde2bf"
 
 
 _check(State, 296, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 136, 160, 192, 216, 248, 272, 280, 288, 292])
@@ -429,7 +429,7 @@ class Event(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Event/9ef3b315edc5cd35"
+        return "masseter/Event/6745a17fbaa89fdc"
 
 
 _check(Event, 88, [0, 8, 16, 24, 32, 40, 44, 48, 52, 56, 60, 62, 64, 68, 72, 80])
@@ -476,7 +476,7 @@ class Truth(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Truth/1f4bd7c5b12a8199"
+        return "masseter/Truth/5b773950ee9a9618"
 
 
 _check(Truth, 368, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240, 288, 296, 304, 352, 360])
@@ -507,7 +507,7 @@ class Contact(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Contact/23e17f519c62e157"
+        return "masseter/Contact/6f3c47a8dda10d46"
 
 
 _check(Contact, 872, [0, 8, 16, 24, 32, 40, 104, 488])
