@@ -399,23 +399,20 @@ impl ForceObserver {
         let losses = Vector6::from_fn(|axis, _| friction.screw_doubt(axis, config.screw_uncertainty));
         let loads_n = [&braking.coulomb_n, &braking.screw_n];
         let calibrated = self.calibration.doubts_n(&motion.rates_m_s, loads_n);
-        let of_friction = match calibrated {
-            Some([left_n, loaded_n]) => {
-                [vertical.dot(&left_n), vertical.dot(&loaded_n.component_mul(&losses)), 0.0, 0.0, 0.0, 0.0]
-            }
-            None => {
-                let speeds_m_s = motion.rates_m_s.abs();
-                let unloaded_n = Vector6::from(friction.coulomb_n(&Loads::default()));
-                let share = config.friction_uncertainty;
-                [
-                    vertical.dot(&self.law_doubt_n(&speeds_m_s, &braking.coulomb_n)),
-                    vertical.dot(&braking.screw_n.component_mul(&losses)),
-                    share * vertical.dot(&unloaded_n),
-                    share * friction.viscous_n_s_per_m() * vertical.dot(&speeds_m_s),
-                    share * braking.joints[2],
-                    config.mass_uncertainty * weight_n,
-                ]
-            }
+        let of_friction = if let Some([left_n, loaded_n]) = calibrated {
+            [vertical.dot(&left_n), vertical.dot(&loaded_n.component_mul(&losses)), 0.0, 0.0, 0.0, 0.0]
+        } else {
+            let speeds_m_s = motion.rates_m_s.abs();
+            let unloaded_n = Vector6::from(friction.coulomb_n(&Loads::default()));
+            let share = config.friction_uncertainty;
+            [
+                vertical.dot(&self.law_doubt_n(&speeds_m_s, &braking.coulomb_n)),
+                vertical.dot(&braking.screw_n.component_mul(&losses)),
+                share * vertical.dot(&unloaded_n),
+                share * friction.viscous_n_s_per_m() * vertical.dot(&speeds_m_s),
+                share * braking.joints[2],
+                config.mass_uncertainty * weight_n,
+            ]
         };
         let rounding_n = vertical.component_mul(step_n).norm() * ROUNDING_VARIANCE.sqrt();
         let late_n = self.residual[2] - self.late_n;

@@ -64,7 +64,7 @@ impl Progress {
 
     /// Whether the motion has waited for no longer than it may.
     pub(crate) fn check_lag(&self) -> Result<(), Fault> {
-        let Lag { lag_s, limit_s, .. } = self.lag;
+        let Lag { total_s: lag_s, limit_s, .. } = self.lag;
         if lag_s <= limit_s + SAME_TIME_S {
             Ok(())
         } else {
@@ -90,7 +90,7 @@ impl Progress {
             (ControllerState::Holding, _) => self.playback.stop(),
             _ => {}
         }
-        (self.cycles_at_rest, self.lag.lag_s) = (0, 0.0);
+        (self.cycles_at_rest, self.lag.total_s) = (0, 0.0);
     }
 
     /// Ends a cycle.
@@ -103,7 +103,7 @@ impl Progress {
 /// such a loop sends neither readings nor commands.
 #[derive(Debug, Clone, Default)]
 struct Lag {
-    lag_s: f64,
+    total_s: f64,
     limit_s: f64,
     /// The last cycle without a reading of its own, or after one that the controller lost.
     gap_cycle: u64,
@@ -116,7 +116,7 @@ impl Lag {
         }
         let since_gap_s = cycle.saturating_sub(self.gap_cycle) as f64 * sequencer.period_s;
         if sequencer.state == ControllerState::Running && since_gap_s > AFTER_LOST_S {
-            self.lag_s += waited_s;
+            self.total_s += waited_s;
         }
     }
 }

@@ -26,15 +26,15 @@ pub(super) struct ShownStiffness {
     delay_share: f64,
     /// Share of the change of height that is left after a cycle.
     kept_share: f64,
-    /// Height as the source of the force delays it, and the slow parts of height and force; none before the first sample.
+    /// Height as the source of the force delays it, and both as the delay of the loop shows them; none before the first sample.
     slow: Option<Slow>,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Slow {
     height_m: f64,
-    slow_m: f64,
-    slow_n: f64,
+    late_m: f64,
+    late_n: f64,
     /// Largest change of height of late, m.
     way_m: f64,
 }
@@ -50,12 +50,12 @@ impl ShownStiffness {
 
     /// Takes the requested height at a sample (m) and the force there (N), which may be wrong by `doubt_n`.
     pub(super) fn take(&mut self, height_m: f64, bite_n: f64, doubt_n: f64) {
-        let first = Slow { height_m, slow_m: height_m, slow_n: bite_n, way_m: 0.0 };
+        let first = Slow { height_m, late_m: height_m, late_n: bite_n, way_m: 0.0 };
         let slow = self.slow.get_or_insert(first);
         slow.height_m += (height_m - slow.height_m) * self.source_share;
-        slow.slow_m += (slow.height_m - slow.slow_m) * self.delay_share;
-        slow.slow_n += (bite_n - slow.slow_n) * self.delay_share;
-        let (way_m, rise_n) = (slow.height_m - slow.slow_m, bite_n - slow.slow_n);
+        slow.late_m += (slow.height_m - slow.late_m) * self.delay_share;
+        slow.late_n += (bite_n - slow.late_n) * self.delay_share;
+        let (way_m, rise_n) = (slow.height_m - slow.late_m, bite_n - slow.late_n);
         let certain_n = rise_n.abs() - DOUBT_SHARE * doubt_n;
         slow.way_m = (slow.way_m * self.kept_share).max(way_m.abs());
         if slow.way_m > LEAST_M && way_m * rise_n > 0.0 && certain_n > 0.0 {

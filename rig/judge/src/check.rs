@@ -208,15 +208,16 @@ pub(crate) fn faults(
         (begins_s > lasted_s).then(|| format!("{begins_s} s, after the run's end at {lasted_s:.3} s"))
     };
     let (mut acted, mut late, mut never) = (0, Vec::new(), Vec::new());
-    let (mut behind, mut beyond) = (String::new(), String::new());
+    let (mut behind, mut beyond) = (Vec::new(), Vec::new());
     for (fault, found) in declared.iter().zip(found) {
         let FaultFigures { number, struck_ns, deviation_mm, deviation_deg, detection } = found;
         let waits = fault.after.as_deref() == Some("controller.safe_stop");
         match (struck_ns, behind_end(fault)) {
             (None, None) => never.push(number.to_string()),
             (None, Some(when)) => {
-                behind +=
-                    &format!(", number {number} at {when}: let the fault begin earlier, or play longer");
+                behind.push(format!(
+                    ", number {number} at {when}: let the fault begin earlier, or play longer"
+                ));
             }
             (Some(_), _) if !waits && stopped_ns.is_some_and(|ns| *struck_ns > Some(ns)) => {
                 late.push(number.to_string());
@@ -225,10 +226,10 @@ pub(crate) fn faults(
         }
         if !is_within(*deviation_mm, tracking_max_mm) || !is_within(*deviation_deg, tracking_max_deg) {
             let until = if detection.is_some() { "before it was detected" } else { "undetected" };
-            beyond += &format!(
+            beyond.push(format!(
                 "; number {number}, {fault}, moved the jaw {deviation_mm:.3} mm and {deviation_deg:.3}° from its path {until}, \
                  limit {tracking_max_mm} mm and {tracking_max_deg}°"
-            );
+            ));
         }
     }
     let which = |numbers: &[String], what: &str| match numbers {
@@ -243,9 +244,8 @@ pub(crate) fn faults(
         (true, false) => CheckResult::Untested,
         (false, _) => CheckResult::Failed,
     };
-    let finding =
-        format!("{acted} of {} declared faults acted{after}{never}{behind}{beyond}", declared.len());
-    let check = Check::new("faults", finding, result);
+    let finding = format!("{acted} of {} declared faults acted{after}{never}", declared.len());
+    let check = Check::new("faults", finding + &behind.concat() + &beyond.concat(), result);
     (!declared.is_empty()).then_some(Check { subject: Subject::Faults { have_all_acted }, ..check })
 }
 

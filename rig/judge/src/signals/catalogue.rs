@@ -157,7 +157,8 @@ fn add_contact(list: &mut SignalList, scenario: &Scenario) {
         })
         .truth_if(true);
     }
-    let measures: [(&str, Unit, &str, fn(&Pressure) -> f64); 3] = [
+    type Measure = fn(&Pressure) -> f64;
+    let measures: [(&str, Unit, &str, Measure); 3] = [
         ("contact_area", Unit::MM2, "Area over which antagonist or food press on", |on| on.area_m2),
         ("pressure", Unit::MPA, "Mean pressure of antagonist or food on", |on| on.mean_pa),
         ("pressure_peak", Unit::MPA, "Highest pressure of antagonist or food on", |on| on.peak_pa),
@@ -228,7 +229,8 @@ fn add_energy(list: &mut SignalList) {
         list.add(format!("energy.{name}"), Unit::J, about, move |of| Some(of.truth?.work_j[kind]))
             .truth_if(true);
     }
-    let stored: [(&str, &str, fn(&Truth) -> f64); 3] = [
+    type Stored = fn(&Truth) -> f64;
+    let stored: [(&str, &str, Stored); 3] = [
         ("kinetic", "Energy of the mechanism's motion.", |truth| truth.kinetic_j),
         ("potential", "Energy of the mechanism's height above that of the start.", |truth| truth.potential_j),
         (
