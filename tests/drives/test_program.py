@@ -29,7 +29,7 @@ def test_six_drives_boot_move_and_fail(drives: Maker) -> None:
     bus.drive(4).begin("fault")
     with pytest.raises(DriveFault, match="node 4"):
         move(network[4], -2000)
-    assert {bus.drive(node).state for node in (1, 2, 3, 5, 6)} == {"operation enabled"}
+    assert {bus.drive(node).state for node in (1, 2, 3, 5, 6)} == {"operation_enabled"}
 
 
 def test_a_motor_without_force_lets_its_load_fall(drives: Maker) -> None:
@@ -53,7 +53,7 @@ def test_a_program_that_connects_by_itself_finds_the_drives_by_their_channel(dri
         node = network.add_node(9)
         node.nmt.state = "RESET"
         node.nmt.wait_for_bootup(10)
-        assert bus.drive(9).state == "switch on disabled"
+        assert bus.drive(9).state == "switch_on_disabled"
         assert network.scanner.nodes == [9]
 
 

@@ -128,7 +128,7 @@ class Drive:
 
     @property
     def state(self) -> str:
-        """State under CiA 402, such as "operation enabled"."""
+        """State under CiA 402, such as "operation_enabled"."""
         return self._world.at_present().power_state(self.node)
 
     @property
@@ -184,7 +184,7 @@ class Drives(can.BusABC):
         self.nodes, self.lost = self._world.nodes, 0
         self._networks: list[Any] = []
         self.channel_info = f"emulated drives {self.nodes} on channel {self.channel!r}"
-        super().__init__(channel, can_filters)
+        super().__init__(self.channel, can_filters)
 
     @staticmethod
     def _joined(channel: str | None, bitrate: int | None, settings: Mapping[str, Any]) -> _World:
@@ -297,9 +297,13 @@ class Drives(can.BusABC):
 
     @property
     def state(self) -> can.BusState:
-        """The fault confinement of this bus."""
+        """The fault confinement of this bus, which nobody sets."""
         states = can.BusState.ACTIVE, can.BusState.PASSIVE, can.BusState.ERROR
         return states[self._open().at_present().error_state(self._bus)]
+
+    @state.setter
+    def state(self, new_state: can.BusState) -> None:
+        raise NotImplementedError("the wire alone changes the state of a bus")
 
     def shutdown(self) -> None:
         """Closes the bus; the one that made the drives switches them off."""

@@ -46,8 +46,8 @@ fn setting_error(key: &str, value: impl Display, need: &dyn Display) -> PyErr {
 const BUSES: usize = 8;
 /// All ports of a wire.
 const PORTS: usize = 128;
-/// Frames of a bus that wait for the wire.
-const TRANSMIT_CAPACITY: usize = 64;
+/// Frames of a bus that wait for the wire: a scan of all nodes sends 127 at once.
+const TRANSMIT_CAPACITY: usize = 256;
 /// The step of the drives: a frame is received within such a time after its end, ns.
 const STEP_NS: u64 = 125_000;
 /// How often a thread that lets time pass gives way to another.
