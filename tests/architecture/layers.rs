@@ -18,7 +18,7 @@ const MAY_USE: [(&str, &[&str]); 29] = [
     ("shared/no_bindgen", &[]),
     ("controller", &["shared/can", "shared/model", "shared/scenario", "shared/runtime"]),
     ("rig/bindings/c", &["shared/model", "shared/runtime", "shared/scenario", "controller"]),
-    ("rig/bindings/drives", &["shared/can", "plant/drives"]),
+    ("rig/bindings/drives", &["shared/can", "shared/features", "plant/drives"]),
     (
         "rig/bindings/python",
         &[
