@@ -118,9 +118,10 @@ fn an_encoder_that_jumps_gets_the_brake_instead_of_a_loop() {
         let (mut bench, target) = Bench::cycling();
         bench.offset_m = jump_m;
         bench.cycle(0x0F, target);
-        let (state, told) = match is_fault {
-            true => (DriveState::Fault, vec![EmergencyCode::POSITION_SENSOR]),
-            false => (DriveState::OperationEnabled, Vec::new()),
+        let (state, told) = if is_fault {
+            (DriveState::Fault, vec![EmergencyCode::POSITION_SENSOR])
+        } else {
+            (DriveState::OperationEnabled, Vec::new())
         };
         assert_eq!((bench.drive.state(), bench.emergencies()), (state, told), "{jump_m} m");
     }
@@ -139,9 +140,10 @@ fn a_stop_that_leaves_its_ramp_ends_in_the_brake() {
         bench.run_ms(50);
         assert!((bench.position_m - stopped_m).abs() < 1e-6, "it stands");
         assert!((stopped_m - from_m).abs() < 1e-3, "{} m", stopped_m - from_m);
-        let (state, told) = match is_turned {
-            true => (DriveState::Fault, vec![EmergencyCode::VELOCITY]),
-            false => (DriveState::SwitchOnDisabled, Vec::new()),
+        let (state, told) = if is_turned {
+            (DriveState::Fault, vec![EmergencyCode::VELOCITY])
+        } else {
+            (DriveState::SwitchOnDisabled, Vec::new())
         };
         assert_eq!((bench.drive.state(), bench.emergencies()), (state, told));
     }

@@ -111,7 +111,9 @@ mod outage {
             &Reading { woke_ns: 980 * PERIOD_NS, skipped_cycles: 30, ..Reading::default() },
             false,
         );
-        [1200, 1000, 1100].into_iter().for_each(|at_ms| watch.stop(at_ms * PERIOD_NS));
+        for at_ms in [1200, 1000, 1100] {
+            watch.stop(at_ms * PERIOD_NS);
+        }
         assert_eq!(watch.outage(PERIOD_NS), Some(Outage { missed: 30, of: 100 }));
     }
 

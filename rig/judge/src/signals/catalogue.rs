@@ -15,6 +15,11 @@ use crate::condyles::Condyles;
 use crate::poses::true_pose;
 use crate::pressure::{PressedTooth, Pressure};
 
+/// A measure of what presses on a tooth.
+type Measure = fn(&Pressure) -> f64;
+/// An energy in the truth, J.
+type Stored = fn(&Truth) -> f64;
+
 /// The signals of a run of this scenario with this jaw, whose controller declares these.
 pub(super) fn signals(scenario: &Scenario, jaw: Jaw, declared: &Declared) -> Vec<NamedSignal> {
     let mut list = SignalList::default();
@@ -157,7 +162,6 @@ fn add_contact(list: &mut SignalList, scenario: &Scenario) {
         })
         .truth_if(true);
     }
-    type Measure = fn(&Pressure) -> f64;
     let measures: [(&str, Unit, &str, Measure); 3] = [
         ("contact_area", Unit::MM2, "Area over which antagonist or food press on", |on| on.area_m2),
         ("pressure", Unit::MPA, "Mean pressure of antagonist or food on", |on| on.mean_pa),
@@ -229,7 +233,6 @@ fn add_energy(list: &mut SignalList) {
         list.add(format!("energy.{name}"), Unit::J, about, move |of| Some(of.truth?.work_j[kind]))
             .truth_if(true);
     }
-    type Stored = fn(&Truth) -> f64;
     let stored: [(&str, &str, Stored); 3] = [
         ("kinetic", "Energy of the mechanism's motion.", |truth| truth.kinetic_j),
         ("potential", "Energy of the mechanism's height above that of the start.", |truth| truth.potential_j),
