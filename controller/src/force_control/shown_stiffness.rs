@@ -14,7 +14,7 @@ const MARGIN: f64 = 1.5;
 /// slow motion, where force and height are out of phase, show no stiffness.
 const PERIOD_IN_DELAYS: f64 = 4.0;
 /// Share of the doubt in a change of force: errors of friction hold on while a swing lasts.
-const DOUBT_SHARE: f64 = 0.5;
+const DOUBT_SHARE: f64 = 0.2;
 
 /// The largest stiffness so far.
 #[derive(Debug, Clone)]
