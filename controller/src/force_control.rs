@@ -39,8 +39,11 @@ const NEAR_M: f64 = 2e-6;
 const SLOW_M_S: f64 = 2e-3;
 /// Share of a bite for the ramp of a hold.
 const RAMP_SHARE: f64 = 0.1;
-/// Noise of a load cell as a share of the force of contact: most of what a scenario may have.
-const CELL_DOUBT: f64 = 0.2;
+/// Share of the estimate's uncertainty that is taken off a change of force. A larger share hides the stiffness of a bite that
+/// shakes; a smaller one takes an error of friction, which turns with the motion, for stiffness, and the bite is slower.
+const ESTIMATE_DOUBT: f64 = 0.2;
+/// Noise of a load cell that is taken off, in standard deviations: more than its peaks in a bite.
+const CELL_DOUBT: f64 = 5.0;
 /// Share of the force of contact below which nothing is between the teeth.
 const EMPTY_SHARE: f64 = 0.5;
 
@@ -65,6 +68,8 @@ pub(crate) struct ForceControl {
     lead_cycles: f64,
     /// End of the range of the controlled force, N.
     range_n: f64,
+    /// Doubt in a change of the load cell's force, N.
+    cell_doubt_n: f64,
     /// Corrects the drives' error of the requested pose.
     position: PoseControl,
     /// Height of the platform in the closed mouth, m.
@@ -96,6 +101,7 @@ impl ForceControl {
                 ForceSource::Estimate => f64::INFINITY,
                 ForceSource::LoadCell => scenario.load_cell.map_or(f64::INFINITY, |cell| cell.range_n),
             },
+            cell_doubt_n: CELL_DOUBT * scenario.load_cell.map_or(0.0, |cell| cell.noise_n),
             position: PoseControl::new(&scenario.controller, scenario.rate_hz),
             closed_m,
             stiffness: ShownStiffness::new(
@@ -131,8 +137,10 @@ impl ForceControl {
         let before_m = self.motion_m.replace(height_m).unwrap_or(height_m);
         self.motion_m_s = (height_m - before_m) / self.period_s;
         let doubt_n = match self.config.source {
-            ForceSource::Estimate => demand.external.map_or(f64::INFINITY, |external| external.uncertainty_n),
-            ForceSource::LoadCell => CELL_DOUBT * self.config.contact_n,
+            ForceSource::Estimate => {
+                demand.external.map_or(f64::INFINITY, |external| ESTIMATE_DOUBT * external.uncertainty_n)
+            }
+            ForceSource::LoadCell => self.cell_doubt_n,
         };
         let at_sample_m = demand.desired.translation.z + self.detour().at_sample_m.z;
         self.stiffness.take(at_sample_m, bite_n, doubt_n);

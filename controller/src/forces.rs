@@ -77,15 +77,16 @@ impl Forces {
         self.observer.as_ref().and_then(ForceObserver::external)
     }
 
-    /// Refuses a bite force above the limit of the force control, whatever law controls the force.
+    /// Refuses a bite force above the limit of the force control, or one that is no number, whatever law controls the force.
+    /// During a calibration the rough force counts: a limit has no time without a force.
     pub(crate) fn check_bite(&self) -> Result<(), Fault> {
         let Some(control) = &self.control else { return Ok(()) };
         let bite_n = match control.source {
-            ForceSource::Estimate => self.external().map(|external| external.bite_n()),
+            ForceSource::Estimate => self.observer.as_ref().and_then(ForceObserver::rough_bite_n),
             ForceSource::LoadCell => self.load_cell_n,
         };
-        match bite_n.unwrap_or_default() {
-            bite_n if bite_n > control.limit_n() => {
+        match bite_n {
+            Some(bite_n) if bite_n.is_nan() || bite_n > control.limit_n() => {
                 Err(Fault::new(Cause::ForceLimit, bite_n, control.limit_n()))
             }
             _ => Ok(()),
@@ -332,6 +333,11 @@ impl ForceObserver {
             moment_nm: [moment_x, moment_y, moment_z],
             uncertainty_n: self.uncertainty_n,
         })
+    }
+
+    /// The bite force, N, also from a calibration that is not complete; none before two intervals.
+    fn rough_bite_n(&self) -> Option<f64> {
+        (self.uncertainty_n != f64::INFINITY).then_some(-self.residual[2])
     }
 
     /// Takes the sample of a cycle: the pose, and the drives' mean forces (N) since the sample before. A gap between

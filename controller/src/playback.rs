@@ -100,7 +100,7 @@ impl Progress {
 }
 
 /// By how much the motion is late, since it waited for lost or late frames. Waits for a loop that lost cycles do not count:
-/// such a loop sends neither readings nor commands.
+/// such a loop sends neither readings nor commands. A reading that comes late looks the same, so its waits do not count either.
 #[derive(Debug, Clone, Default)]
 struct Lag {
     total_s: f64,

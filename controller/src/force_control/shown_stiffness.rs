@@ -1,20 +1,18 @@
 //! The stiffness of a bite, as the course of its height and its force shows it.
 //!
 //! Height and force pass the same high-pass, whose time constant is the delay of the loop: what is left are the
-//! frequencies at which the loop can shake. A force whose change may be an error of the estimate shows nothing. This
-//! module changes no damping and knows no food.
+//! frequencies at which the loop can shake. The doubt in a change of force is taken off; an error beyond the doubt shows as
+//! stiffness, and the bite is slower. This module changes no damping and knows no food.
 
 use masseter_scenario::ForceControlConfig;
 
 /// Least change of height that shows a stiffness, m: more than encoders and drives deviate.
 const LEAST_M: f64 = 4e-6;
-/// Margin of the damping: a change of force counts only with its certain part.
+/// Margin of the damping for the part of a change of force that its doubt hides.
 const MARGIN: f64 = 1.5;
 /// Delays for which a change of height counts: the period of an oscillation at the limit of stability. So the turning points of a
 /// slow motion, where force and height are out of phase, show no stiffness.
 const PERIOD_IN_DELAYS: f64 = 4.0;
-/// Share of the doubt in a change of force: errors of friction hold on while a swing lasts.
-const DOUBT_SHARE: f64 = 0.2;
 
 /// The largest stiffness so far.
 #[derive(Debug, Clone)]
@@ -48,7 +46,7 @@ impl ShownStiffness {
         Self { n_per_m: 0.0, delay_s, source_share, delay_share, kept_share, slow: None }
     }
 
-    /// Takes the requested height at a sample (m) and the force there (N), which may be wrong by `doubt_n`.
+    /// Takes the requested height at a sample (m) and the force there (N), whose changes may be wrong by `doubt_n`.
     pub(super) fn take(&mut self, height_m: f64, bite_n: f64, doubt_n: f64) {
         let first = Slow { height_m, late_m: height_m, late_n: bite_n, way_m: 0.0 };
         let slow = self.slow.get_or_insert(first);
@@ -56,7 +54,7 @@ impl ShownStiffness {
         slow.late_m += (slow.height_m - slow.late_m) * self.delay_share;
         slow.late_n += (bite_n - slow.late_n) * self.delay_share;
         let (way_m, rise_n) = (slow.height_m - slow.late_m, bite_n - slow.late_n);
-        let certain_n = rise_n.abs() - DOUBT_SHARE * doubt_n;
+        let certain_n = rise_n.abs() - doubt_n;
         slow.way_m = (slow.way_m * self.kept_share).max(way_m.abs());
         if slow.way_m > LEAST_M && way_m * rise_n > 0.0 && certain_n > 0.0 {
             self.n_per_m = self.n_per_m.max(certain_n / slow.way_m);
@@ -97,10 +95,11 @@ mod tests {
         for frequency_hz in [20.0, 40.0] {
             let n_per_m = shown_n_per_m(frequency_hz, 0.0);
             assert!((0.9e6..1.1e6).contains(&n_per_m), "{frequency_hz} Hz: {n_per_m}");
-            let n_per_m = shown_n_per_m(frequency_hz, 10.0);
-            assert!((0.3e6..1e6).contains(&n_per_m), "{frequency_hz} Hz with doubt: {n_per_m}");
+            let n_per_m = shown_n_per_m(frequency_hz, 2.0);
+            assert!((0.80e6..0.90e6).contains(&n_per_m), "{frequency_hz} Hz with doubt: {n_per_m}");
         }
-        assert!(shown_n_per_m(20.0, 100.0) < 1.0);
+        assert!(shown_n_per_m(20.0, 12.0) > 1.0);
+        assert!(shown_n_per_m(20.0, 20.0) < 1.0);
     }
 
     #[test]

@@ -42,11 +42,10 @@ impl Condyles {
     pub(crate) fn forces_n(
         &self,
         [before, now]: [&Truth; 2],
-        contact: Option<&Contact>,
+        contact: &Contact,
     ) -> Option<[Vec3; 2]> {
         let ((_, before), (pose, twist)) = (self.motion(before)?, self.motion(now)?);
-        let teeth = contact.into_iter().flat_map(Contact::teeth);
-        let loads = teeth.map(|tooth| (Vec3::from(tooth.place_m), Vec3::from(tooth.force_n)));
+        let loads = contact.teeth().map(|tooth| (Vec3::from(tooth.place_m), Vec3::from(tooth.force_n)));
         Some(self.shared(&pose, &twist, &((twist - before) / self.cycle_s), loads))
     }
 

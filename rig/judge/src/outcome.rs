@@ -222,7 +222,7 @@ pub(crate) fn excuse(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     if !timing.is_disturbed() || timing.missed > 0 {
         return None;
     }
-    let lost_s = timing.lost as f64 * manifest.scenario.period_s();
+    let lost_s = timing.lost_longest as f64 * manifest.scenario.period_s();
     let beyond_s = manifest.scenario.controller.overdue_s;
     let outage = figures.outage.filter(|outage| outage.explains_the_stop());
     match (&manifest.ending, figures.stopped_by) {

@@ -40,6 +40,9 @@ pub struct Timing {
     /// Cycles that the machine took from controller or plant, and those of unknown cause. Without the scheduling that the
     /// rig requested, also those after overlong work that is not certainly a loop's own.
     pub lost: u64,
+    /// Those of the loop that lost more.
+    #[serde(skip)]
+    pub(crate) lost_longest: u64,
     /// Cycles that the rig missed by itself.
     pub missed: u64,
     /// Cycles that faults of the scenario took from a loop.
@@ -70,6 +73,8 @@ impl Timing {
         });
         let missed_by = [0, 1]
             .map(|index| loops[index].skipped.saturating_sub(lost_by[index] + loops[index].by_scenario));
+        // What stops the machine stops both loops: their losses are one time.
+        let lost_longest = lost_by.into_iter().max().unwrap_or_default();
         let (lost, missed) = (lost_by.iter().sum(), missed_by.iter().sum());
         let stalled = loops.iter().map(|skips| skips.by_scenario).sum();
         let word = if figures.cycles == 0 {
@@ -89,7 +94,7 @@ impl Timing {
         let overrun = figures.overruns.first().copied();
         let told = overrun.map(|overrun| format!("; {overrun}")).unwrap_or_default();
         let evidence = figures.overrun_attribution.map(in_words).unwrap_or_default() + &told;
-        Self { word, cycles, lost, missed, stalled, missed_by, evidence, overrun }
+        Self { word, cycles, lost, lost_longest, missed, stalled, missed_by, evidence, overrun }
     }
 
     /// The loop's own stretch of work that made it miss deadlines, in words; empty without one.

@@ -16,16 +16,17 @@ section! {
         /// Time from the first estimate on in which nothing touches the jaw while it moves: friction and weight beside the
         /// model's are identified from this time, and there is no estimate until then. 0: no calibration.
         pub calibration_s: f64 = 0.0 => Within(0.0, 60.0),
-        /// Share by which Coulomb, viscous and joint friction may differ from the model's; only for the published uncertainty,
-        /// as the keys below.
+        /// Share by which Coulomb, viscous and joint friction may differ from the model's. This key and those below are for the
+        /// uncertainty, by which the force control judges the stiffness that a bite shows.
         pub friction_uncertainty: f64 = 0.3 => Within(0.0, 10.0),
         /// By which the breakaway ratio may exceed the model's.
         pub breakaway_uncertainty: f64 = 0.4 => Within(0.0, 2.0),
-        /// By which the efficiency of a leg's screw may differ from the model's.
+        /// By which the efficiency of a screw may differ from the model's.
         pub screw_uncertainty: f64 = 0.1 => Within(0.0, 0.5),
         /// Share by which the weight may differ from the model's.
         pub mass_uncertainty: f64 = 0.1 => Within(0.0, 10.0),
-        /// Speed of an axis below which its friction may have either direction, as another law of friction gives.
+        /// Speed of an axis below which its friction may have either direction, as another law of friction gives; also the width of
+        /// rest in a calibration.
         pub rest_speed_m_s: f64 = 0.002 => Within(0.0, 0.1),
     }
 }

@@ -51,7 +51,7 @@ impl ActionKind {
             // Positions in m; a quaternion of any length.
             Self::Pose => vec![[-1.0, 1.0]; 7],
             Self::Forces => axes
-                .map(|axis| plan.scenario.drives.of_axis(axis).max_force_n)
+                .map(|axis| plan.scenario.max_force_n(axis))
                 .map(|most_n| [-most_n, most_n])
                 .collect(),
         }

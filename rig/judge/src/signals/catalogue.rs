@@ -158,7 +158,7 @@ fn add_contact(list: &mut SignalList, scenario: &Scenario) {
         );
         list.add(format!("condyle.{side}.load"), Unit::N, about, move |of| {
             let truths = [of.truth_before.as_ref()?, of.truth.as_ref()?];
-            Some(condyles.as_ref()?.forces_n(truths, of.contact.as_ref())?[place].norm())
+            Some(condyles.as_ref()?.forces_n(truths, of.contact.as_ref()?)?[place].norm())
         })
         .truth_if(true);
     }

@@ -96,7 +96,8 @@ impl Stated<'_> {
         };
         Some(format!(
             "force_control.{key} is {stated_n_per_m:.0} N/m, but {what} and the drives together have {n_per_m:.0} N/m: {effect}; \
-             set {key} to {n_per_m:.0} and {prefix}damping_n_s_per_m to {least:.0} or more"
+             set {key} to {n_per_m:.0} and {prefix}damping_n_s_per_m to {:.0} or more",
+            least.ceil()
         ))
     }
 }

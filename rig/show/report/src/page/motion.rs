@@ -321,7 +321,7 @@ pub(super) fn actuators_section(scenario: &Scenario, figures: &Figures) -> Secti
         Block::chart(format!("velocity-{}", kind.name()), chart).half()
     };
     let force = |kind: Kind| {
-        let limits = both_ways(drives[kind as usize].max_force_n);
+        let limits = both_ways(scenario.max_force_n(kind.axes().start));
         Block::chart(format!("force-{}", kind.name()), force_chart(kind, figures, limits)).half()
     };
     let charts = [KINDS.map(position), KINDS.map(velocity), KINDS.map(force)];
