@@ -43,7 +43,7 @@ def main() -> None:
         for calibration, size in CALIBRATED.items():
             where = f'{group} AND "force_estimate.calibration_s" {size}'
             row = duckdb.sql(f"SELECT {values} FROM '{table}' WHERE {where}").fetchall()[0]
-            cells = [f"{value:.{decimals}f}" for value, (_, _, decimals) in zip(row, COLUMNS, strict=True)]
+            cells = ["–" if value is None else f"{value:.{decimals}f}" for value, (_, _, decimals) in zip(row, COLUMNS, strict=True)]
             print(f"| {name} | {calibration} | " + " | ".join(cells) + " |")
     covered, runs = duckdb.sql(f"SELECT avg(bite_covered), count(bite_covered) FROM '{table}'").fetchall()[0]
     if not runs or covered < least:

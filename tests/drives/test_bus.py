@@ -182,7 +182,7 @@ def test_every_fault_begins_and_ends(simulated: Maker, kind: FaultKind) -> None:
     drive.begin(kind, SIZES.get(kind))
     bus.advance(0.1)
     if kind in ("fault", "reboot", "sto"):
-        assert drive.state != "operation enabled"
+        assert drive.state != "operation_enabled"
     if kind in ("fault", "reboot", "runaway", "emcy_storm"):
         assert drive.has_struck(kind)
     drive.end(kind)

@@ -37,7 +37,7 @@ def test_a_motor_without_force_lets_its_load_fall(drives: Maker) -> None:
     node = bus.network()[3]
     enable(node)
     drive = bus.drive(3)
-    drive.load_n = 100.0
+    drive.load_n = 10.0
     drive.begin("torque_loss", 1.0)
     with pytest.raises(DriveFault, match="8611h"):
         move(node, 20_000)

@@ -9,7 +9,7 @@ from collections import Counter
 from mcap.reader import make_reader
 from mcap_ros2.reader import read_ros2_messages
 
-LAYOUT_VERSION = 14
+LAYOUT_VERSION = 15
 TOPICS = ("command", "reading", "state", "truth", "frames", "event", "parameter")
 
 counts = Counter()

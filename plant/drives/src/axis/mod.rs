@@ -10,6 +10,7 @@ pub(crate) mod modes;
 pub(crate) mod motion;
 pub(crate) mod parameters;
 mod power;
+mod profile;
 mod servo;
 
 use masseter_can::canopen::EmergencyCode;
@@ -29,6 +30,7 @@ use motion::{
 };
 use parameters::{Offsets, Parameters};
 use power::PowerStage;
+use profile::Profile;
 use servo::{FollowingErrorMonitor, ServoLimits};
 
 /// One axis.
@@ -492,7 +494,8 @@ impl Axis {
         jumps
     }
 
-    /// Judges the velocity of an axis that stops; returns whether its distance from the ramp is a new fault. The
+    /// Judges the velocity of an axis that stops; returns whether its distance from the ramp is a new fault. A halt and a
+    /// change of mode are no stops. The
     /// reaction is the brake: a loop that leaves its ramp closes over a wrong position, or lacks the force (IEC 61800-5-2,
     /// SS1-r).
     fn supervise_stop(&mut self, now_ns: u64, command: ServoCommand) -> bool {

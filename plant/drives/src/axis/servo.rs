@@ -13,6 +13,8 @@ const VELOCITY_FILTER_S: f64 = 5e-4;
 const RUNAWAY_SHARE: f64 = 0.25;
 /// Largest way of a measured position in a step, in ways at the drive's velocity.
 const MOST_WAYS: f64 = 10.0;
+/// Counts that an encoder's noise may make in a step, for axes so slow that noise is faster.
+const MOST_NOISE: f64 = 8.0;
 /// Stiffness of the closed brake, N/m, and its damping, N per m/s.
 pub(super) const BRAKE_STIFFNESS_N_M: f64 = 2e5;
 pub(super) const BRAKE_DAMPING_N_S_M: f64 = 400.0;
@@ -89,13 +91,15 @@ impl Servo {
 
     /// Largest distance of a stopping axis' velocity from its ramp, m/s.
     pub(super) fn runaway_m_s(&self) -> f64 {
-        RUNAWAY_SHARE * self.config.max_velocity_m_s
+        let count_m_s = self.config.encoder_resolution_m / self.step_s;
+        (RUNAWAY_SHARE * self.config.max_velocity_m_s).max(MOST_NOISE * count_m_s)
     }
 
     /// Whether a measured position is farther from the last one than any axis comes in a step.
     pub(super) fn is_jump(&self, measured_m: f64) -> bool {
         let way_m = (measured_m - self.motion.position_m).abs();
-        way_m > MOST_WAYS * self.config.max_velocity_m_s * self.step_s
+        let axis_m = MOST_WAYS * self.config.max_velocity_m_s * self.step_s;
+        way_m > axis_m.max(MOST_NOISE * self.config.encoder_resolution_m)
     }
 
     /// A motion after a step to a position, with its velocity filtered.
@@ -264,6 +268,23 @@ mod servo_tests {
         let Motion { position_m, velocity_m_s } =
             simulate(|_| ServoCommand::Force { force_n: 100.0 }, 0.6, 20.0, 0.5);
         assert!((0.2..0.4).contains(&velocity_m_s), "{velocity_m_s} at {position_m}");
+    }
+}
+
+#[cfg(test)]
+mod limit_tests {
+    use super::*;
+
+    #[test]
+    fn noise_of_a_slow_axis_is_neither_a_jump_nor_a_runaway() {
+        let ratings = Ratings { max_velocity_m_s: 1e-3, ..Ratings::default() };
+        let mut servo = Servo::new(ratings, 1.25e-4, 0.27);
+        for count in [4.0, -4.0, 4.0] {
+            assert!(!servo.is_jump(0.27 + count * 1e-6));
+            servo.motion = servo.moved(servo.motion, 0.27 + count * 1e-6);
+            assert!(servo.motion.velocity_m_s.abs() < servo.runaway_m_s());
+        }
+        assert!(servo.is_jump(0.27 + 2e-5));
     }
 }
 

@@ -76,9 +76,10 @@ impl DictionaryAccess<'_> {
             return entry.check_access();
         }
         if entry.kind == DataType::Domain {
+            entry.check_access()?;
             allow(data.len() <= USER_DATA_MAX, AbortCode::TOO_LONG)?;
             *self.user_data = data.to_vec();
-            return entry.check_access();
+            return Ok(());
         }
         let word = entry.writable(data, is_sized)?;
         let is_closed = match object.index {

@@ -319,7 +319,7 @@ impl DriveNode {
             && (is_another || now_ns >= self.next_storm_ns)
         {
             self.axis.faults.strike(DriveFault::EmcyStorm);
-            self.next_storm_ns = now_ns + (every_s * SECOND_NS as f64) as u64;
+            self.next_storm_ns = now_ns.saturating_add((every_s * SECOND_NS as f64) as u64);
             let register = self.objects.get(names::ERROR_REGISTER);
             self.send_emergency(Some(Emergency { code: STORM, register, vendor: [0; 5] }));
         }

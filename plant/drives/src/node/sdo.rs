@@ -12,6 +12,8 @@ use super::block::{BLOCK_SIZE, BlockDownload, BlockUpload};
 
 /// Silence of a client that ends a transfer, ns.
 const TIMEOUT_NS: u64 = 1_000_000_000;
+/// Time from one segment of a block to the next, ns: about that of a frame at 125 kbit/s, so that no queue overflows.
+const SEGMENT_EVERY_NS: u64 = 1_000_000;
 
 /// The data bytes of an answer.
 pub(super) type Response = [u8; 8];
@@ -90,7 +92,6 @@ impl SdoServer {
     }
 
     /// The server's next frame without a request: an abort after the silence of the client, or a segment of a block.
-    /// One segment a step is about as fast as the bus.
     pub(super) fn step(&mut self, now_ns: u64) -> Option<Response> {
         let transfer = self.transfer.as_mut()?;
         if now_ns.saturating_sub(transfer.heard_ns) > TIMEOUT_NS {
@@ -99,6 +100,9 @@ impl SdoServer {
             return Some(SdoResponse::Abort { object, code: AbortCode::TIMED_OUT }.encode());
         }
         let Progress::BlockUpload(upload) = &mut transfer.progress else { return None };
+        if now_ns < transfer.heard_ns + SEGMENT_EVERY_NS {
+            return None;
+        }
         let segment = upload.next_segment()?;
         transfer.heard_ns = now_ns;
         Some(segment.encode())

@@ -54,7 +54,8 @@ impl Client {
 
     /// What the drive answers, after time for a whole block.
     fn hear(&mut self) -> Vec<[u8; 8]> {
-        self.bench.run_ms(20);
+        // A whole block of 127 segments.
+        self.bench.run_ms(140);
         let sent: Vec<Frame> = self.bench.sent[self.seen..].to_vec();
         self.seen = self.bench.sent.len();
         let answers = sent.iter().filter(|frame| frame.id() == Cob::SdoResponse(id(4)).into());

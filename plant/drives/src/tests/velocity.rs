@@ -94,17 +94,17 @@ fn a_velocity_keeps_to_its_limit_and_ends_at_the_software_limit() {
 
 #[test]
 fn a_quick_stop_and_another_mode_bring_a_velocity_to_rest() {
-    for option in [0, 2, 6] {
+    for (option, state) in
+        [(0, DriveState::SwitchOnDisabled), (2, DriveState::SwitchOnDisabled), (6, DriveState::QuickStopActive)]
+    {
         let mut bench = Bench::enabled(PROFILE_VELOCITY);
         bench.write((0x605A, 0), &[option, 0]).unwrap();
         bench.ask_speed(100_000);
         bench.run_ms(100);
         bench.control(0x02);
         bench.run_ms(100);
-        assert!(
-            bench.moves_at(0.0) && bench.drive.state() != DriveState::OperationEnabled,
-            "605A = {option}"
-        );
+        assert!(bench.moves_at(0.0), "605A = {option}");
+        assert_eq!((bench.drive.state(), bench.emergencies()), (state, Vec::new()), "605A = {option}");
     }
     let mut bench = Bench::enabled(PROFILE_VELOCITY);
     bench.ask_speed(100_000);
@@ -112,6 +112,19 @@ fn a_quick_stop_and_another_mode_bring_a_velocity_to_rest() {
     bench.write(MODE, &[PROFILE_POSITION as u8]).unwrap();
     bench.run_ms(100);
     assert!(bench.moves_at(0.0) && bench.drive.state() == DriveState::OperationEnabled);
+}
+
+#[test]
+fn a_stop_from_a_velocity_that_leaves_its_ramp_ends_in_the_brake() {
+    let mut bench = Bench::enabled(PROFILE_VELOCITY);
+    bench.ask_speed(100_000);
+    bench.run_ms(100);
+    let from_m = bench.position_m;
+    bench.turned_at_m = Some(from_m);
+    bench.control(0x02);
+    bench.run_ms(50);
+    assert!((bench.position_m - from_m).abs() < 2e-3, "{} m", bench.position_m - from_m);
+    assert_eq!((bench.drive.state(), bench.emergencies()), (DriveState::Fault, vec![EmergencyCode::VELOCITY]));
 }
 
 /// 605Eh: the brake at once, or a ramp to rest before the drive is in fault.
