@@ -39,11 +39,7 @@ impl Condyles {
     }
 
     /// The forces on the left and the right condyle, base axes, N, from two consecutive cycles and the contact of the second.
-    pub(crate) fn forces_n(
-        &self,
-        [before, now]: [&Truth; 2],
-        contact: &Contact,
-    ) -> Option<[Vec3; 2]> {
+    pub(crate) fn forces_n(&self, [before, now]: [&Truth; 2], contact: &Contact) -> Option<[Vec3; 2]> {
         let ((_, before), (pose, twist)) = (self.motion(before)?, self.motion(now)?);
         let loads = contact.teeth().map(|tooth| (Vec3::from(tooth.place_m), Vec3::from(tooth.force_n)));
         Some(self.shared(&pose, &twist, &((twist - before) / self.cycle_s), loads))

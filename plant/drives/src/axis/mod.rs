@@ -25,9 +25,7 @@ use crate::settings::DriveSettings;
 use drivetrain::Drivetrain;
 use encoder::{Coordinates, Look, Switches};
 use modes::{Homing, Positioning, Sensed};
-use motion::{
-    Demand, Mode, Motion, MotionCommand, NewTargets, PositionView, Profile, Ramp, ServoCommand, clamp,
-};
+use motion::{Demand, Mode, Motion, MotionCommand, NewTargets, PositionView, Ramp, ServoCommand, clamp};
 use parameters::{Offsets, Parameters};
 use power::PowerStage;
 use profile::Profile;

@@ -94,9 +94,11 @@ fn a_velocity_keeps_to_its_limit_and_ends_at_the_software_limit() {
 
 #[test]
 fn a_quick_stop_and_another_mode_bring_a_velocity_to_rest() {
-    for (option, state) in
-        [(0, DriveState::SwitchOnDisabled), (2, DriveState::SwitchOnDisabled), (6, DriveState::QuickStopActive)]
-    {
+    for (option, state) in [
+        (0, DriveState::SwitchOnDisabled),
+        (2, DriveState::SwitchOnDisabled),
+        (6, DriveState::QuickStopActive),
+    ] {
         let mut bench = Bench::enabled(PROFILE_VELOCITY);
         bench.write((0x605A, 0), &[option, 0]).unwrap();
         bench.ask_speed(100_000);
@@ -124,7 +126,10 @@ fn a_stop_from_a_velocity_that_leaves_its_ramp_ends_in_the_brake() {
     bench.control(0x02);
     bench.run_ms(50);
     assert!((bench.position_m - from_m).abs() < 2e-3, "{} m", bench.position_m - from_m);
-    assert_eq!((bench.drive.state(), bench.emergencies()), (DriveState::Fault, vec![EmergencyCode::VELOCITY]));
+    assert_eq!(
+        (bench.drive.state(), bench.emergencies()),
+        (DriveState::Fault, vec![EmergencyCode::VELOCITY])
+    );
 }
 
 /// 605Eh: the brake at once, or a ramp to rest before the drive is in fault.

@@ -50,10 +50,9 @@ impl ActionKind {
             Self::Targets => axes.map(|axis| strokes.of_axis(axis)).collect(),
             // Positions in m; a quaternion of any length.
             Self::Pose => vec![[-1.0, 1.0]; 7],
-            Self::Forces => axes
-                .map(|axis| plan.scenario.max_force_n(axis))
-                .map(|most_n| [-most_n, most_n])
-                .collect(),
+            Self::Forces => {
+                axes.map(|axis| plan.scenario.max_force_n(axis)).map(|most_n| [-most_n, most_n]).collect()
+            }
         }
     }
 
