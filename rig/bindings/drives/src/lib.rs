@@ -200,9 +200,10 @@ impl Bench {
         );
         // A share of the torque; of the others a day in s, or a factor.
         let most = if fault == DriveFault::TorqueLoss { 1.0 } else { 86_400.0 };
-        let need = match has_size {
-            true => format!("give its size, above 0 and at most {most}"),
-            false => "this fault has no size".to_owned(),
+        let need = if has_size {
+            format!("give its size, above 0 and at most {most}")
+        } else {
+            "this fault has no size".to_owned()
         };
         if acts && (size.is_some() != has_size || size.is_some_and(|size| !(size > 0.0 && size <= most))) {
             return Err(setting_error(
