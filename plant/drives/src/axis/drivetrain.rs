@@ -3,7 +3,8 @@
 //! While a brake opens, the motor holds the axis already; while a brake closes, the motor has no current. Without
 //! faults the mechanism gets the force of the loops.
 
-use super::motion::{Motion, ServoCommand};
+use super::demand::ServoCommand;
+use super::motion::Motion;
 use super::servo::{BRAKE_DAMPING_N_S_M, BRAKE_STIFFNESS_N_M, Servo, ServoLimits};
 use crate::faults::{DriveFault, DriveFaults};
 use crate::quirks::AxisQuirks;

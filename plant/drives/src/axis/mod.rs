@@ -4,6 +4,7 @@
 //! commands, the servo follows the [`Demand`], [`FollowingErrorMonitor`] supervises the servo. [`Parameters`] is
 //! the configuration in the object dictionary.
 
+mod demand;
 pub(crate) mod drivetrain;
 pub(crate) mod encoder;
 pub(crate) mod modes;
@@ -22,10 +23,11 @@ use crate::names;
 use crate::quirks::AxisQuirks;
 use crate::ratings::Ratings;
 use crate::settings::DriveSettings;
+use demand::{Demand, Ramp, ServoCommand};
 use drivetrain::Drivetrain;
 use encoder::{Coordinates, Look, Switches};
 use modes::{Homing, Positioning, Sensed};
-use motion::{Demand, Mode, Motion, MotionCommand, NewTargets, PositionView, Ramp, ServoCommand, clamp};
+use motion::{Mode, Motion, MotionCommand, NewTargets, PositionView, clamp};
 use parameters::{Offsets, Parameters};
 use power::PowerStage;
 use profile::Profile;

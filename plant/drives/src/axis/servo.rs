@@ -4,7 +4,8 @@
 //! The loops depend on neither CANopen nor time: the caller gives the command of every step. The monitor of the
 //! following error (6065h, 6066h) only judges; the reaction is the axis' matter.
 
-use super::motion::{Motion, ServoCommand, clamp};
+use super::demand::ServoCommand;
+use super::motion::{Motion, clamp};
 use crate::ratings::Ratings;
 
 /// Time constant of the filter on the measured velocity, s.
@@ -279,7 +280,7 @@ mod limit_tests {
     fn noise_of_a_slow_axis_is_neither_a_jump_nor_a_runaway() {
         let ratings = Ratings { max_velocity_m_s: 1e-3, ..Ratings::default() };
         let mut servo = Servo::new(ratings, 1.25e-4, 0.27);
-        for count in [4.0, -4.0, 4.0] {
+        for count in [3.0, -3.0, 3.0] {
             assert!(!servo.is_jump(0.27 + count * 1e-6));
             servo.motion = servo.moved(servo.motion, 0.27 + count * 1e-6);
             assert!(servo.motion.velocity_m_s.abs() < servo.runaway_m_s());
