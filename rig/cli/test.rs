@@ -128,8 +128,7 @@ pub(super) fn test(args: &TestArgs) -> Result<Exit, Failure> {
         status!("masseter: interrupted after {over} of {} tests", over + report.unrun.len());
         return Ok(Exit::Interrupted);
     }
-    let has_failed = report.tested.iter().any(TestedScenario::is_short);
-    Ok(if has_failed { Exit::Failed } else { Exit::Passed })
+    Ok(report.exit())
 }
 
 fn write_document(path: &Path, text: &str) -> anyhow::Result<()> {

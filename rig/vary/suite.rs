@@ -154,7 +154,7 @@ impl Suite<'_> {
 fn asks_for_another(clock: ClockKind, attempts: &[Attempt], allows_untested: bool) -> bool {
     let Some((last, before)) = attempts.split_last() else { return true };
     if clock == ClockKind::Rt {
-        return last.verdict().is_ok_and(|verdict| verdict.exit_code == Exit::Invalid);
+        return last.is_invalid();
     }
     last.is_short(allows_untested) && before.last().is_none_or(|before| before.is_same(last))
 }

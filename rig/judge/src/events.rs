@@ -113,6 +113,11 @@ impl EventRecord {
         text.trim_end().to_owned()
     }
 
+    /// Whether the controller reports that the jaw left its path.
+    pub(crate) fn is_off_path(&self) -> bool {
+        matches!(self.cause, Code::Known(Cause::TrackingLost | Cause::OrientationLost))
+    }
+
     /// In which value and limit are shown. Cycles and times of the bus are numbers as they are.
     fn unit(&self) -> Unit {
         use Cause::{

@@ -149,6 +149,11 @@ impl Figures {
         self.events.iter().any(|event| event.cause == Cause::StopRequested)
     }
 
+    /// The first fault that anybody reports.
+    pub(crate) fn first_fault(&self) -> Option<&EventRecord> {
+        self.events.iter().find(|event| event.kind == EventKind::Fault)
+    }
+
     /// When the rig began to stop: a safe stop, or one by request. A program stops without an event.
     pub(crate) fn stopped_ns(&self) -> Option<u64> {
         let is_stop = |event: &&EventRecord| event.begins_stop() || event.cause == Cause::StopRequested;
@@ -158,8 +163,7 @@ impl Figures {
 
     /// The fault of the scenario that struck last before anybody reported a fault, unless the fault had ended long before.
     pub(crate) fn declared_cause(&self) -> Option<&FaultFigures> {
-        let first = self.events.iter().find(|event| event.kind == EventKind::Fault);
-        let reported_ns = first.map_or(u64::MAX, |event| event.time_ns);
+        let reported_ns = self.first_fault().map_or(u64::MAX, |event| event.time_ns);
         let ended_ns = |fault: &FaultFigures| {
             let is_its_end = |event: &&EventRecord| {
                 event.cause == Cause::FaultEnded && event.value as usize == fault.number

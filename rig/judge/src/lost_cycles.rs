@@ -100,6 +100,11 @@ impl Outage {
     pub fn explains_the_stop(self) -> bool {
         self.missed as f64 >= self.of as f64 * EXPLAINS
     }
+
+    /// Whether a deviation that stopped the rig may come from them. One lost cycle is enough, as for a check of the path.
+    pub fn explains_a_deviation(self) -> bool {
+        self.missed > 0
+    }
 }
 
 /// Counts the deadlines that both processes miss until the rig stops.

@@ -1,14 +1,14 @@
 //! What to do next about a run that did not pass: one sentence for each kind of verdict.
 
 use masseter_recording::{Ending, Manifest};
-use masseter_runtime::messages::codes::{Cause, EventKind};
+use masseter_runtime::messages::codes::Cause;
 use masseter_scenario::ExpectedVerdict::{Died, Fail, Incomplete, Interrupted, Pass, SafeStop, Untested};
 use masseter_scenario::Scenario;
 
 use crate::breach::Breach;
 use crate::check::{Check, Subject};
 use crate::checks::lag_cause;
-use crate::events::{Code, EventRecord};
+use crate::events::Code;
 use crate::figures::Figures;
 use crate::outcome::{Outcome, clock_jump};
 
@@ -204,9 +204,9 @@ impl NextStep {
         if figures.declared_cause().is_some() {
             return Self::DeclaredFault;
         }
-        let is_fault = |event: &&EventRecord| event.kind == EventKind::Fault;
-        let first = figures.events.iter().find(is_fault);
-        let Some(Code::Known(cause)) = first.map(|event| event.cause) else { return Self::Stop };
+        let Some(Code::Known(cause)) = figures.first_fault().map(|event| event.cause) else {
+            return Self::Stop;
+        };
         match cause {
             DriveFault | Emergency | EnableTimeout | FaultAtStart | FaultFound | NotReady | NotEnabled
             | StillPowered => Self::Drive,

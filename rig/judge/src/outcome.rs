@@ -216,15 +216,17 @@ pub(crate) fn clock_jump(usage: &RunUsage, can: &CanConfig) -> Option<OutcomeRea
     })
 }
 
-/// The excuse for a stop, in words: the machine lost all missed cycles, and many of them just before a safe stop, or so many that
-/// an overdue controller had less than its time.
+/// The excuse for a stop, in words: the machine lost all missed cycles. Many of them were just before a safe stop, or one just before
+/// a deviation that stopped the rig; or an overdue controller had less than its time.
 pub(crate) fn excuse(manifest: &Manifest, figures: &Figures, timing: &Timing) -> Option<String> {
     if !timing.is_disturbed() || timing.missed > 0 {
         return None;
     }
     let lost_s = timing.lost_longest as f64 * manifest.scenario.period_s();
     let beyond_s = manifest.scenario.controller.overdue_s;
-    let outage = figures.outage.filter(|outage| outage.explains_the_stop());
+    let is_off_path = figures.first_fault().is_some_and(EventRecord::is_off_path);
+    let explains = if is_off_path { Outage::explains_a_deviation } else { Outage::explains_the_stop };
+    let outage = figures.outage.filter(|outage| explains(*outage));
     match (&manifest.ending, figures.stopped_by) {
         (Ending::SafeStop, _) | (Ending::Completed, Some(_)) | (Ending::Overdue, Some(StoppedBy::Master)) => {
             let Outage { missed, of } = outage?;

@@ -101,6 +101,7 @@ mod outage {
             let outage = outage(missed).unwrap();
             assert_eq!(outage, Outage { missed: expected, of: 100 }, "{missed:?}");
             assert_eq!(outage.explains_the_stop(), explains, "{missed:?}");
+            assert_eq!(outage.explains_a_deviation(), expected > 0, "{missed:?}");
         }
     }
 

@@ -398,6 +398,20 @@ fn a_safe_stop_is_one_unless_the_machine_alone_explains_it() {
     let stopped = (Exit::SafeStop, "the controller stopped the rig".to_owned());
     assert_eq!(stop(|run| run.figures.outage = None), stopped);
     assert_eq!(stop(|run| run.figures.outage = Some(Outage { missed: 9, of: 100 })), stopped);
+    for (cause, missed, exit_code) in [
+        (Cause::OrientationLost, 1, Exit::Invalid),
+        (Cause::TrackingLost, 1, Exit::Invalid),
+        (Cause::TrackingLost, 0, Exit::SafeStop),
+        (Cause::StrokeLimit, 1, Exit::SafeStop),
+    ] {
+        let mut run = Run::new();
+        run.manifest.ending = Ending::SafeStop;
+        run.disturb();
+        run.figures.outage = Some(Outage { missed, of: 100 });
+        run.figures.events.push((&Event::new(Source::Controller, EventKind::Fault, cause)).into());
+        let found = Verdict::new(&run.manifest, &run.figures);
+        assert_eq!(found.exit_code, exit_code, "{cause:?} after {missed} missed: {}", found.reason);
+    }
     assert_eq!(stop(|run| run.figures.controller_skips.by_machine = 2), stopped, "one was the rig's");
     let (outcome, _) = stop(|run| {
         (run.figures.controller_skips.by_machine, run.figures.controller_skips.while_working) = (2, 1);

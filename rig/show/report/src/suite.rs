@@ -76,6 +76,11 @@ impl Attempt {
         }
     }
 
+    /// Whether the machine spoiled the run.
+    pub fn is_invalid(&self) -> bool {
+        self.verdict().is_ok_and(|verdict| verdict.exit_code == Exit::Invalid)
+    }
+
     /// Whether the rig did the same in both, with the same verdict.
     pub fn is_same(&self, other: &Self) -> bool {
         let what = |attempt: &Self| {
@@ -342,6 +347,18 @@ impl SuiteReport {
             (true, _) => "FAILED",
             (false, true) => "ok",
             (false, false) => "INTERRUPTED",
+        }
+    }
+
+    /// The exit code of the suite. Invalid: the machine spoiled the last run of every scenario that did not pass.
+    pub fn exit(&self) -> Exit {
+        let short: Vec<_> = self.tested.iter().filter(|tested| tested.is_short()).collect();
+        if short.is_empty() {
+            Exit::Passed
+        } else if short.iter().all(|tested| tested.last().is_invalid()) {
+            Exit::Invalid
+        } else {
+            Exit::Failed
         }
     }
 

@@ -111,6 +111,21 @@ fn a_result_that_changes_in_simulated_time_is_a_failure_of_its_own() {
 }
 
 #[test]
+fn a_suite_is_invalid_if_the_machine_spoiled_all_that_did_not_pass() {
+    let judgements =
+        [passed(1.0), judged("INVALID", Exit::Invalid, "a", 0.0), judged("FAIL", Exit::Failed, "a", -1.0)];
+    let [passed, spoiled, failed] =
+        judgements.map(|judgement| TestedScenario { is_simulated: false, ..tested("one", vec![judgement]) });
+    for (tested, exit) in [
+        (vec![passed.clone()], Exit::Passed),
+        (vec![passed, spoiled.clone(), spoiled.clone()], Exit::Invalid),
+        (vec![failed, spoiled], Exit::Failed),
+    ] {
+        assert_eq!(report(tested, None).exit(), exit);
+    }
+}
+
+#[test]
 fn what_is_untested_may_be_allowed() {
     let untested = || vec![judged("UNTESTED", Exit::Failed, "a", 1.0)];
     for (allows_untested, is_short) in [(false, true), (true, false)] {
