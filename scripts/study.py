@@ -450,8 +450,8 @@ def sections(claims: list) -> list[dict]:
     text = lambda name, words: {"id": name, "kind": "text", "data": words}
     tone = {"holds": "good", "holds in part": "doubtful", "does not hold": "bad"}
     figure = lambda claim: {"text": "figure", "href": f"#{claim.figure}.svg"} if claim.figure else ""
-    rows = [[str(number), claim.statement, claim.section, claim.measured, claim.criterion,
-             {"mark": claim.verdict, "tone": tone[claim.verdict]}, figure(claim)] for number, claim in enumerate(claims, 1)]
+    rows = [[str(number), f"{claim.statement} — {claim.section}", {"mark": claim.verdict, "tone": tone[claim.verdict]}, claim.measured,
+             claim.criterion, figure(claim)] for number, claim in enumerate(claims, 1)]
     return [
         {"id": "claims", "title": "Claims", "blocks": [
             text("about", "The paper describes the 6-DOF mastication mechanism and its forward kinematics. Fig. 2 leaves three things open, "
@@ -461,7 +461,7 @@ def sections(claims: list) -> list[dict]:
                  f"is halved at most 40 times. From above the base: {settings.samples} random inputs with one true solution, each with a random "
                  "guess of leg angles between 0° and 180°. Verdicts follow from the figures of this run by the criterion beside them."),
             text("again", f"To repeat it: `{settings.command}`. Only times differ from run to run."),
-            table_block("claims", "Table of claims", ["#", "the paper's claim", "where", "measured", "criterion", "verdict", "figure"], [], rows)]},
+            table_block("claims", "Table of claims", ["#", "the paper's claim", "verdict", "measured", "criterion", "figure"], [], rows)]},
         {"id": "readings", "title": "Readings", "blocks": [
             text("rates-about", "Any / true / closest solution of those reached, in %. Random inputs over the whole strokes, guesses above the "
                  "base; columns are the iterations allowed."),
