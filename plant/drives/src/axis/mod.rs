@@ -319,7 +319,7 @@ impl Axis {
         self.shown_n = self.drivetrain.motor_n.value;
         let error = if has_jumped {
             Some(EmergencyCode::POSITION_SENSOR)
-        } else if self.supervise_stop(now_ns, command) {
+        } else if self.supervise_velocity(now_ns, command) {
             Some(EmergencyCode::VELOCITY)
         } else {
             self.supervise_following(now_ns, command).then_some(EmergencyCode::FOLLOWING_ERROR)
@@ -494,17 +494,18 @@ impl Axis {
         jumps
     }
 
-    /// Judges the velocity of an axis that stops; returns whether its distance from the ramp is a new fault. A halt and a
-    /// change of mode are no stops. The
-    /// reaction is the brake: a loop that leaves its ramp closes over a wrong position, or lacks the force (IEC 61800-5-2,
-    /// SS1-r).
-    fn supervise_stop(&mut self, now_ns: u64, command: ServoCommand) -> bool {
+    /// Judges the velocity against the demand; returns whether their distance is a new fault. An axis that stops stays near its
+    /// ramp; a halt and a change of mode are no stops. An axis in operation may lag or catch up after lost targets, but does not
+    /// run ahead of its demand. The reaction is the brake: such a loop closes over a wrong position, or lacks the force
+    /// (IEC 61800-5-2, SS1-r).
+    fn supervise_velocity(&mut self, now_ns: u64, command: ServoCommand) -> bool {
+        let ServoCommand::Follow(demanded) = command else { return false };
         let is_stopping = self.power.leaves_for.is_some()
             || matches!(self.power.state, DriveState::QuickStopActive | DriveState::FaultReactionActive);
-        let ServoCommand::Follow(ramp) = command else { return false };
         let servo = &self.drivetrain.servo;
-        let apart_m_s = (servo.motion.velocity_m_s - ramp.velocity_m_s).abs();
-        let runs_away = is_stopping && apart_m_s > servo.runaway_m_s();
+        let apart_m_s = servo.motion.velocity_m_s - demanded.velocity_m_s;
+        let ahead_m = (servo.motion.position_m - demanded.position_m) * apart_m_s.signum();
+        let runs_away = apart_m_s.abs() > servo.runaway_m_s() && (is_stopping || ahead_m > servo.runaway_m());
         let is_new = runs_away && !self.power.is_in_fault();
         if runs_away {
             self.enter(DriveState::Fault, now_ns);

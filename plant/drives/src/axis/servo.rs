@@ -10,8 +10,10 @@ use crate::ratings::Ratings;
 
 /// Time constant of the filter on the measured velocity, s.
 const VELOCITY_FILTER_S: f64 = 5e-4;
-/// Largest distance of a stopping axis' velocity from its ramp, as a share of the drive's velocity.
+/// Largest distance of an axis' velocity from the demanded one, as a share of the drive's velocity.
 const RUNAWAY_SHARE: f64 = 0.25;
+/// Time in which an axis that catches up after lost targets is back on its demand. Overshoot stays below a third.
+const RUNAWAY_S: f64 = 1e-3;
 /// Largest way of a measured position in a step, in ways at the drive's velocity.
 const MOST_WAYS: f64 = 10.0;
 /// Counts that an encoder's noise may make in a step, for axes so slow that noise is faster.
@@ -90,10 +92,15 @@ impl Servo {
         }
     }
 
-    /// Largest distance of a stopping axis' velocity from its ramp, m/s.
+    /// Largest distance of an axis' velocity from the demanded one, m/s.
     pub(super) fn runaway_m_s(&self) -> f64 {
         let count_m_s = self.config.encoder_resolution_m / self.step_s;
         (RUNAWAY_SHARE * self.config.max_velocity_m_s).max(MOST_NOISE * count_m_s)
+    }
+
+    /// Largest way of an axis in operation ahead of its demand at such a velocity, m.
+    pub(super) fn runaway_m(&self) -> f64 {
+        RUNAWAY_S * self.runaway_m_s()
     }
 
     /// Whether a measured position is farther from the last one than any axis comes in a step.

@@ -30,7 +30,8 @@ pub enum Law {
     NoWrongPass,
     /// A fault that the matrix calls detected is reported in the time that the matrix says, with a margin.
     Detected,
-    /// The mechanism stands still after a stop, unless nothing holds the jaw, or an undetected fault led it away before.
+    /// The mechanism stands still after a stop, unless nothing holds the jaw, or a fault that was not yet detected led it away
+    /// before.
     Standstill,
     /// No message is missing, and the same storm has the same messages with a recording.
     Complete,
@@ -141,7 +142,14 @@ impl Run<'_> {
         // A fault that begins while the rig stands still strikes no part of the test.
         let is_let_go = self.storm.faults.iter().any(|fault| moves_on(fault.kind));
         // Pressed against its stops, the jaw gives way as the drives let go.
-        let is_excused = is_let_go || (self.left_path().is_some() && self.has_undetected());
+        let is_pressed = self.left_path().is_some() && self.has_undetected();
+        // The check of the faults fails where a fault was detected beyond the limits: the axis then runs into its brake.
+        let is_late = self
+            .verdict
+            .checks
+            .iter()
+            .any(|check| check.name == "faults" && check.result == CheckResult::Failed);
+        let is_excused = is_let_go || is_pressed || is_late;
         (check.result == CheckResult::Failed && !is_excused).then(|| check.finding.clone())
     }
 
