@@ -33,6 +33,9 @@ use power::PowerStage;
 use profile::Profile;
 use servo::{FollowingErrorMonitor, ServoLimits};
 
+/// Steps in which an axis gets faster ahead of its demand until that is a fault. A jump of the encoder makes one.
+const FLEEING_STEPS: u32 = 3;
+
 /// One axis.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Axis {
@@ -46,6 +49,8 @@ pub(crate) struct Axis {
     parameters: Parameters,
     demand: Demand,
     following: FollowingErrorMonitor,
+    /// Steps in a row in which the axis got faster ahead of its demand.
+    fleeing_steps: u32,
     positioning: Positioning,
     pub(super) homing: Homing,
     mode: Mode,
@@ -80,6 +85,7 @@ impl Axis {
             quirks,
             demand: Demand::Brake,
             following: FollowingErrorMonitor::default(),
+            fleeing_steps: 0,
             positioning: Positioning::default(),
             homing: Homing::default(),
             mode: Mode::from_number(objects.get(names::MODE)).unwrap_or(Mode::CyclicPosition),
@@ -315,11 +321,12 @@ impl Axis {
         let has_jumped = self.supervise_encoder(now_ns);
         let command = self.servo_command(now_ns);
         let limits = self.servo_limits(command);
+        let before_m_s = self.drivetrain.servo.motion.velocity_m_s;
         let force_n = self.drivetrain.step(now_ns, places_m, command, &limits, &mut self.faults);
         self.shown_n = self.drivetrain.motor_n.value;
         let error = if has_jumped {
             Some(EmergencyCode::POSITION_SENSOR)
-        } else if self.supervise_velocity(now_ns, command) {
+        } else if self.supervise_velocity(now_ns, command, before_m_s) {
             Some(EmergencyCode::VELOCITY)
         } else {
             self.supervise_following(now_ns, command).then_some(EmergencyCode::FOLLOWING_ERROR)
@@ -495,17 +502,23 @@ impl Axis {
     }
 
     /// Judges the velocity against the demand; returns whether their distance is a new fault. An axis that stops stays near its
-    /// ramp; a halt and a change of mode are no stops. An axis in operation may lag or catch up after lost targets, but does not
-    /// run ahead of its demand. The reaction is the brake: such a loop closes over a wrong position, or lacks the force
-    /// (IEC 61800-5-2, SS1-r).
-    fn supervise_velocity(&mut self, now_ns: u64, command: ServoCommand) -> bool {
+    /// ramp; a halt and a change of mode are no stops. An axis in operation may lag, catch up and overshoot after a step of its
+    /// targets, but does not get faster and faster ahead of its demand. The reaction is the brake: such a loop closes over a wrong
+    /// position, or lacks the force (IEC 61800-5-2, SS1-r).
+    fn supervise_velocity(&mut self, now_ns: u64, command: ServoCommand, before_m_s: f64) -> bool {
         let ServoCommand::Follow(demanded) = command else { return false };
         let is_stopping = self.power.leaves_for.is_some()
             || matches!(self.power.state, DriveState::QuickStopActive | DriveState::FaultReactionActive);
         let servo = &self.drivetrain.servo;
-        let apart_m_s = servo.motion.velocity_m_s - demanded.velocity_m_s;
-        let ahead_m = (servo.motion.position_m - demanded.position_m) * apart_m_s.signum();
-        let runs_away = apart_m_s.abs() > servo.runaway_m_s() && (is_stopping || ahead_m > servo.runaway_m());
+        let Motion { position_m, velocity_m_s } = servo.motion;
+        let apart_m_s = velocity_m_s - demanded.velocity_m_s;
+        let is_apart = apart_m_s.abs() > servo.runaway_m_s();
+        let side = apart_m_s.signum();
+        let is_fleeing = is_apart
+            && (position_m - demanded.position_m) * side > servo.runaway_m()
+            && (velocity_m_s - before_m_s) * side > 0.0;
+        self.fleeing_steps = if is_fleeing { self.fleeing_steps + 1 } else { 0 };
+        let runs_away = is_apart && is_stopping || self.fleeing_steps >= FLEEING_STEPS;
         let is_new = runs_away && !self.power.is_in_fault();
         if runs_away {
             self.enter(DriveState::Fault, now_ns);

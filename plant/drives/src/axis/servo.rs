@@ -12,7 +12,7 @@ use crate::ratings::Ratings;
 const VELOCITY_FILTER_S: f64 = 5e-4;
 /// Largest distance of an axis' velocity from the demanded one, as a share of the drive's velocity.
 const RUNAWAY_SHARE: f64 = 0.25;
-/// Time in which an axis that catches up after lost targets is back on its demand. Overshoot stays below a third.
+/// Time that an axis ahead of its demand has been so fast, for the way that is no overshoot.
 const RUNAWAY_S: f64 = 1e-3;
 /// Largest way of a measured position in a step, in ways at the drive's velocity.
 const MOST_WAYS: f64 = 10.0;

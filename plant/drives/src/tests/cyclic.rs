@@ -158,7 +158,10 @@ fn an_axis_that_runs_ahead_of_its_demand_gets_the_brake_and_one_that_catches_up_
         target += 100;
         bench.cycle(0x0F, target);
     }
-    assert_eq!((bench.drive.state(), bench.emergencies()), (DriveState::Fault, vec![EmergencyCode::VELOCITY]));
+    assert_eq!(
+        (bench.drive.state(), bench.emergencies()),
+        (DriveState::Fault, vec![EmergencyCode::VELOCITY])
+    );
 
     let (mut bench, mut target) = Bench::cycling();
     for lost in [1, 2, 3] {

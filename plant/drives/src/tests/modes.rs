@@ -2,6 +2,8 @@
 
 use super::*;
 
+const MAX_TORQUE: (u16, u8) = (0x6072, 0);
+
 #[test]
 fn cyclic_targets_are_followed_from_sync_to_sync() {
     let (mut bench, target) = Bench::cycling();
@@ -110,9 +112,9 @@ fn a_following_error_is_a_fault_that_only_an_edge_resets() {
     let (mut bench, target) = Bench::cycling();
     bench.write((0x6065, 0), &200_u32.to_le_bytes()).unwrap();
     bench.write((0x6066, 0), &2_u16.to_le_bytes()).unwrap();
-    bench.load_n = 1100.0;
-    bench.run_ms(6);
-    bench.load_n = LOAD_N;
+    bench.write(MAX_TORQUE, &0_u16.to_le_bytes()).unwrap();
+    bench.run_ms(20);
+    bench.write(MAX_TORQUE, &2000_u16.to_le_bytes()).unwrap();
     bench.run_ms(200);
     assert_eq!(bench.emergencies(), [EmergencyCode::FOLLOWING_ERROR]);
     assert_eq!(bench.drive.state(), DriveState::Fault);
@@ -133,11 +135,11 @@ fn a_window_left_for_less_than_its_time_out_is_no_following_error() {
     let (mut bench, target) = Bench::cycling();
     bench.write((0x6065, 0), &50_u32.to_le_bytes()).unwrap();
     bench.write((0x6066, 0), &1000_u16.to_le_bytes()).unwrap();
-    bench.load_n = 1100.0;
-    bench.run_ms(6);
+    bench.write(MAX_TORQUE, &0_u16.to_le_bytes()).unwrap();
+    bench.run_ms(20);
     assert!((bench.read((0x60F4, 0)).unwrap() as i32).abs() > 50);
     assert!(!bench.has(StatusBit::FollowingError));
-    bench.load_n = LOAD_N;
+    bench.write(MAX_TORQUE, &2000_u16.to_le_bytes()).unwrap();
     bench.cycle(0x0F, target);
     assert_eq!(bench.drive.state(), DriveState::OperationEnabled);
 }
@@ -146,8 +148,10 @@ fn a_window_left_for_less_than_its_time_out_is_no_following_error() {
 fn without_a_window_no_following_error_is_seen() {
     let (mut bench, _) = Bench::cycling();
     bench.write((0x6065, 0), &u32::MAX.to_le_bytes()).unwrap();
-    bench.load_n = 1020.0;
-    bench.run_ms(60);
+    bench.write(MAX_TORQUE, &0_u16.to_le_bytes()).unwrap();
+    bench.run_ms(20);
+    let error = bench.read((0x60F4, 0)).unwrap() as i32;
+    assert!(error.abs() > 50, "{error}");
     assert_eq!(bench.drive.state(), DriveState::OperationEnabled);
 }
 
