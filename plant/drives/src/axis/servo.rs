@@ -13,7 +13,7 @@ const VELOCITY_FILTER_S: f64 = 5e-4;
 /// Largest distance of an axis' velocity from the demanded one, as a share of the drive's velocity.
 const RUNAWAY_SHARE: f64 = 0.25;
 /// Time that an axis ahead of its demand has been so fast, for the way that is no overshoot.
-const RUNAWAY_S: f64 = 1e-3;
+const RUNAWAY_S: f64 = 3e-3;
 /// Largest way of a measured position in a step, in ways at the drive's velocity.
 const MOST_WAYS: f64 = 10.0;
 /// Counts that an encoder's noise may make in a step, for axes so slow that noise is faster.

@@ -35,7 +35,7 @@ fn a_drive_that_runs_away_pushes_with_full_force_until_the_window_ends_whatever_
     hold_until(&mut bench, 0.5);
     let before_m = bench.truth.joint_m[L2];
     hold_until(&mut bench, 0.52);
-    assert_eq!(first_failure(&bench), Some((Cause::FollowingError, 4)));
+    assert_eq!(first_failure(&bench), Some((Cause::Emergency, 4)));
     assert!(bench.truth.joint_m[L2] > before_m + 1e-3);
     hold_until(&mut bench, 0.9);
     let [_, high_m] = Scenario::default().mechanism.strokes.of_axis(L2);
