@@ -2,9 +2,7 @@
 //!
 //! The command passes that on to whatever states it, so a new commit recompiles this package and no other.
 
-use std::env;
-use std::path::Path;
-use std::process::Command;
+use std::{env, path::Path, process::Command};
 
 /// What the command is made of. Other files, such as documents and tests, do not make a build "modified".
 const SOURCES: [&str; 7] = ["Cargo.lock", "Cargo.toml", "controller", "examples", "plant", "rig", "shared"];

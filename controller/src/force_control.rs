@@ -15,15 +15,12 @@ mod shown_stiffness;
 use std::f64::consts::PI;
 
 use masseter_model::geometry::{Pose, Vec3};
-use masseter_runtime::control::NoBranch;
-use masseter_runtime::messages::codes::ControllerState;
-use masseter_runtime::named::Declared;
+use masseter_runtime::{control::NoBranch, messages::codes::ControllerState, named::Declared};
 use masseter_scenario::{BiteProfile, ForceControlConfig, ForceSource, MOST_LEAD_CYCLES, Scenario};
 use nalgebra::Translation3;
 
-use crate::forces::signal;
-use crate::pose_control::PoseControl;
 use crate::pose_law::{Demand, Detour, LawFailed, PoseLaw};
+use crate::{forces::signal, pose_control::PoseControl};
 use shown_stiffness::ShownStiffness;
 
 /// Cycles of a fall of the bite force to half when food breaks.

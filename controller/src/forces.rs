@@ -9,10 +9,8 @@ use masseter_runtime::named::Signal;
 use masseter_scenario::{ForceControlConfig, ForceEstimateConfig, ForceSource, Scenario};
 use nalgebra::{SVector, Vector6};
 
-use crate::forces::calibration::Calibration;
 use crate::pose_law::{Detour, ExternalForce, PoseLaw};
-use crate::safety::Fault;
-use crate::sequencer::Sequencer;
+use crate::{forces::calibration::Calibration, safety::Fault, sequencer::Sequencer};
 
 mod calibration;
 

@@ -9,8 +9,7 @@ use masseter_model::geometry::{Deviation, Mechanism, Pose, Vec3};
 use masseter_runtime::messages::codes::Cause;
 use masseter_scenario::Scenario;
 
-use crate::safety::Fault;
-use crate::sequencer::Estimate;
+use crate::{safety::Fault, sequencer::Estimate};
 
 /// Least number of readings, and least time, with an effect of a disturbed one. The drives take a target at the next
 /// SYNC and reach the target at the second; the motion catches up in the third. The drives' loops need milliseconds at

@@ -8,9 +8,8 @@ use masseter_model::geometry::{AXES, Mechanism, Pose};
 use masseter_runtime::messages::codes::{Cause, ControllerState};
 use masseter_scenario::{ControllerConfig, MotionConfig, Scenario, TrajectoryLimitsConfig};
 
-use crate::safety::Fault;
-use crate::sequencer::Sequencer;
 use crate::trajectory::{self, Trajectory, TrajectoryReport, interpolate, minimum_jerk};
+use crate::{safety::Fault, sequencer::Sequencer};
 
 /// Time between two looks at the motion for its margins, s.
 const MARGINS_EVERY_S: f64 = 0.005;

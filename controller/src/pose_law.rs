@@ -3,13 +3,10 @@
 //! The sequence (enable, ease, run, hold, disable), kinematics, playback and every safety check stay with
 //! [`MotionController`](crate::motion_controller::MotionController) for every law.
 
-use std::fmt;
-use std::ops::Range;
+use std::{fmt, ops::Range};
 
 use masseter_model::geometry::{AXES, Pose, Twist, Vec3};
-use masseter_runtime::control::NoBranch;
-use masseter_runtime::messages::codes::ControllerState;
-use masseter_runtime::named::Declared;
+use masseter_runtime::{control::NoBranch, messages::codes::ControllerState, named::Declared};
 use nalgebra::{Quaternion, Translation3, Unit};
 
 /// What a pose law needs of a cycle. Poses are those of the platform in the base frame, m.

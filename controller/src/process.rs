@@ -6,9 +6,8 @@ use masseter_runtime::lifecycle::attach::{AttachError, attach};
 use masseter_runtime::lifecycle::{ProcessArguments, ProcessContext, ProcessError};
 use masseter_scenario::Scenario;
 
-use crate::motion_controller::MotionController;
-use crate::pose_law::PoseLaw;
 use crate::trajectory::{Trajectory, TrajectoryError};
+use crate::{motion_controller::MotionController, pose_law::PoseLaw};
 
 /// Builds a controller for a scenario, its mechanism and its motion.
 pub type BuildController = fn(&Scenario, Mechanism, Trajectory) -> Box<dyn Controller>;

@@ -4,8 +4,7 @@ use masseter_model::geometry::{AXES, Actuators, InverseError, LEGS, LimitViolati
 use masseter_runtime::messages::codes::{Cause, DriveState, NO_AXIS, NoPose, drive_state};
 use masseter_runtime::messages::{Event, Reading};
 
-use crate::kinematics::ForwardError;
-use crate::pose_law::LawFailed;
+use crate::{kinematics::ForwardError, pose_law::LawFailed};
 
 /// Largest error of a quaternion's length: beyond it, the error moves the platform's points by this share of their
 /// distance.

@@ -6,13 +6,12 @@
 #[cfg(test)]
 mod tests;
 
-use masseter_can::canopen::Cob;
-use masseter_can::faults::FaultNote;
-use masseter_can::{ErrorKind, ErrorReport, ErrorState, ReceiveError, Tapped};
-use masseter_runtime::injection::Withdrawn;
+use masseter_can::{
+    ErrorKind, ErrorReport, ErrorState, ReceiveError, Tapped, canopen::Cob, faults::FaultNote,
+};
 use masseter_runtime::messages::codes::{Cause, EventKind, Source};
 use masseter_runtime::messages::{Command, Contact, Event, FrameTap, Reading, Truth, tap};
-use masseter_runtime::realtime::Wake;
+use masseter_runtime::{injection::Withdrawn, realtime::Wake};
 use masseter_scenario::Scenario;
 
 use crate::error::PlantError;

@@ -3,15 +3,11 @@
 
 use std::borrow::Borrow;
 
-use masseter_runtime::clock::SECOND_NS;
 use masseter_runtime::messages::{Command, Contact, Reading, Truth};
-use masseter_runtime::realtime::Wake;
-use masseter_runtime::schedule::CycleSchedule;
+use masseter_runtime::{clock::SECOND_NS, realtime::Wake, schedule::CycleSchedule};
 use masseter_scenario::AFTER_STOP_S;
 
-use crate::core::PlantCore;
-use crate::error::PlantError;
-use crate::master::link::Link;
+use crate::{core::PlantCore, error::PlantError, master::link::Link};
 
 /// Source and destinations of the plant's messages, and the plant's waits.
 pub trait PlantPorts<L: Link> {

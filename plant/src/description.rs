@@ -15,8 +15,7 @@ use masseter_runtime::clock::MILLISECOND_NS;
 use masseter_scenario::{MASTER_NODE, Scenario};
 
 use crate::commissioning::{Survey, object_name};
-use crate::error::PlantError;
-use crate::simulator::emulation::drives::drive_settings;
+use crate::{error::PlantError, simulator::emulation::drives::drive_settings};
 
 /// The electronic data sheets of the drives, in the order of the axes.
 ///

@@ -2,8 +2,7 @@
 
 use std::path::PathBuf;
 
-use masseter_can::canopen::NodeIdError;
-use masseter_can::{BitrateError, NotByPort, OpenError};
+use masseter_can::{BitrateError, NotByPort, OpenError, canopen::NodeIdError};
 use masseter_model::geometry::{GeometryError, InverseError, LimitViolation};
 use masseter_scenario::DynamicsConfig;
 

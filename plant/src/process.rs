@@ -1,22 +1,16 @@
 //! The plant's process binds the pure core to iceoryx2, and to real time or lockstep. This module decides nothing.
 
-use masseter_runtime::clock;
-use masseter_runtime::control::Deadline;
 use masseter_runtime::lifecycle::{Party, ProcessArguments, ProcessContext, ProcessError, StopRequest};
 use masseter_runtime::lockstep::{Clock, Lockstep};
 use masseter_runtime::messages::{Command, Contact, Event, Reading, Truth};
-use masseter_runtime::named::Declared;
-use masseter_runtime::realtime::Wake;
-use masseter_runtime::schedule::CycleSchedule;
 use masseter_runtime::transport::{
     FramePublisher, Node, Publisher, ReceivedMessage, Subscriber, TransportError,
 };
+use masseter_runtime::{clock, control::Deadline, named::Declared, realtime::Wake, schedule::CycleSchedule};
 use masseter_scenario::Scenario;
 
-use crate::core::PlantCore;
 use crate::cycle::{PlantPorts, run_after_controller, run_cycle};
-use crate::error::PlantError;
-use crate::master::link::Link;
+use crate::{core::PlantCore, error::PlantError, master::link::Link};
 
 /// Longest played silence of the controller in lockstep, beyond the silence that stops the drives, ns.
 const SILENCE_NS: u64 = 500_000_000;

@@ -3,8 +3,7 @@
 //! A scenario builds a plant, and its cycles change the plant. Only the changed values are the state. The archive does
 //! not hold the rest: mechanism, dictionaries, tables of pushes. So a state needs a plant of the same scenario.
 
-use serde::Serialize;
-use serde::de::DeserializeOwned;
+use serde::{Serialize, de::DeserializeOwned};
 
 /// The destination or the source of a state's values, one after the other.
 pub trait Archive {

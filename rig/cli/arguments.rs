@@ -1,8 +1,7 @@
 //! Command-line arguments that several verbs share, and the parsers of their values.
 
 use std::net::{Ipv4Addr, SocketAddr};
-use std::path::PathBuf;
-use std::time::Duration;
+use std::{path::PathBuf, time::Duration};
 
 use clap::Args;
 use masseter_runtime::lifecycle::{Patience, ProcessArguments};

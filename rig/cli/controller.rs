@@ -7,12 +7,10 @@ use std::path::PathBuf;
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
 use masseter_controller::process;
-use masseter_judge::requirements::event_names;
-use masseter_judge::signals::Registry;
+use masseter_judge::{requirements::event_names, signals::Registry};
 use masseter_plan::{RunPlan, read_scenario};
-use masseter_runtime::control::Outcome;
 use masseter_runtime::named::{Parameter, access};
-use masseter_runtime::transport::Domain;
+use masseter_runtime::{control::Outcome, transport::Domain};
 use masseter_terminal::{Exit, Format, result, result_line};
 
 use super::arguments::ProcessArgs;

@@ -1,8 +1,7 @@
 //! `masseter faults`: the kinds of faults, and the coverage of the rig: what detects each fault, and how far the jaw
 //! leaves its path until then.
 
-use std::fs;
-use std::path::PathBuf;
+use std::{fs, path::PathBuf};
 
 use anyhow::anyhow;
 use clap::{Args, Subcommand};
@@ -12,9 +11,7 @@ use masseter_recording::new_folder;
 use masseter_scenario::{FaultDeclaration, FaultKindConfig};
 use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 
-use crate::run::request::ControllerChoice;
-use crate::run::runner::Runner;
-use crate::vary::matrix;
+use crate::{run::request::ControllerChoice, run::runner::Runner, vary::matrix};
 
 /// The verbs of `faults`.
 #[derive(Debug, Clone, Subcommand)]

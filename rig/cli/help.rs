@@ -1,9 +1,8 @@
 //! Help: the overview of all verbs, grouped by what a user wants; `masseter completions` and `masseter man`. All of
 //! it is made from the definition of the command line.
 
-use std::fmt::Write;
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{fmt::Write, fs};
 
 use anyhow::Context;
 use clap::{Args, Command};

@@ -1,8 +1,6 @@
 //! `masseter identify`: friction, masses, lag and play of a robot from the recording of a run.
 
-use std::fmt::Write;
-use std::fs;
-use std::path::PathBuf;
+use std::{fmt::Write, fs, path::PathBuf};
 
 use anyhow::Context;
 use clap::Args;

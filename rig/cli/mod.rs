@@ -21,10 +21,7 @@ mod storm;
 mod test;
 mod why;
 
-use std::ffi::OsString;
-use std::path::PathBuf;
-use std::process::ExitCode;
-use std::sync::Arc;
+use std::{ffi::OsString, path::PathBuf, process::ExitCode, sync::Arc};
 
 use clap::{ColorChoice, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use masseter_recorder::RecorderArgs;
@@ -34,12 +31,10 @@ use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, Failure, OrFailure, choose_colour, in_one_line, result_line, status};
 use rustix::process::umask;
 
-use crate::BUILD;
 use crate::doctor::{self, DoctorArgs};
 use crate::robot::{self, RobotVerb};
-use crate::run::exec_program;
 use crate::run::request::{Readers, RunRequest};
-use crate::vary::play::play_case;
+use crate::{BUILD, run::exec_program, vary::play::play_case};
 use arguments::ProcessArgs;
 use campaign::{CampaignArgs, SearchArgs, ShrinkArgs};
 use can::CanVerb;

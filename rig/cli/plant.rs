@@ -7,9 +7,8 @@ use anyhow::{Context, bail};
 use clap::Args;
 use masseter_plant::emulation::{Emulator, EmulatorCounters};
 use masseter_plant::process::{self, Reason};
-use masseter_runtime::clock;
-use masseter_runtime::lifecycle::StopRequest;
 use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
+use masseter_runtime::{clock, lifecycle::StopRequest};
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, result_line, status};
 

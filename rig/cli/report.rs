@@ -1,9 +1,7 @@
 //! The verbs for past runs: `masseter report` writes a report again or compares two runs, `masseter replay` repeats the
 //! decisions of a controller, `masseter diff` compares two recordings message by message.
 
-use std::fs;
-use std::os::unix::fs::MetadataExt;
-use std::path::PathBuf;
+use std::{fs, os::unix::fs::MetadataExt, path::PathBuf};
 
 use clap::Args;
 use masseter_recording::{Manifest, RunFolder};

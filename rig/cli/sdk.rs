@@ -1,9 +1,8 @@
 //! What a project of `masseter new` is built with: a checkout of Masseter's source, or a folder of `scripts/release`. The
 //! command looks for it beside itself, since it may be installed anywhere.
 
-use std::env;
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{env, fs};
 
 use thiserror::Error;
 

@@ -13,12 +13,10 @@ use masseter_runtime::clock;
 use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, result_line, status};
 
-use crate::BUILD;
 use crate::run::request::{ClockKind, ControllerChoice};
-use crate::run::runner::Runner;
-use crate::vary::suite::Suite;
 use crate::vary::suite::cases::{Case, Cases, Selection};
 use crate::vary::suite::choice::{Choice, Shard};
+use crate::{BUILD, run::runner::Runner, vary::suite::Suite};
 
 /// The arguments of `test`.
 #[derive(Debug, Clone, Args)]

@@ -1,7 +1,6 @@
 //! `masseter why`: the last instant from which a failed run still passes without what acted on it.
 
-use std::fmt::Write;
-use std::path::PathBuf;
+use std::{fmt::Write, path::PathBuf};
 
 use anyhow::Context;
 use clap::Args;
@@ -11,8 +10,7 @@ use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, status};
 use masseter_virtual_time::Without;
 
-use crate::run::interrupts::Interrupts;
-use crate::vary::why;
+use crate::{run::interrupts::Interrupts, vary::why};
 
 /// The arguments of `why`.
 #[derive(Debug, Clone, Args)]

@@ -8,8 +8,7 @@ mod kernel;
 mod processors;
 mod resources;
 
-use std::fmt::Write;
-use std::fs::OpenOptions;
+use std::{fmt::Write, fs::OpenOptions};
 
 use clap::Args;
 use masseter_can::is_supported;

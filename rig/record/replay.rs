@@ -3,8 +3,7 @@
 //!
 //! The loop is open: a different command reaches no robot, so the readings stay those of the run.
 
-use std::collections::VecDeque;
-use std::path::Path;
+use std::{collections::VecDeque, path::Path};
 
 use anyhow::Context;
 use masseter_controller::process;

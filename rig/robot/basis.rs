@@ -3,8 +3,7 @@
 use std::fmt::{self, Display, Formatter};
 
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::commissioning::Known;
-use masseter_plant::wanted::rpdo_timeout_ms;
+use masseter_plant::{commissioning::Known, wanted::rpdo_timeout_ms};
 use masseter_scenario::Scenario;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};

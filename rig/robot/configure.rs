@@ -16,14 +16,12 @@ use masseter_scenario::{Scenario, wording::counted};
 use masseter_terminal::{Exit, Failure, OrFailure, Tone, result, result_with_tones, status};
 use serde::{Deserialize, Serialize};
 
-use super::args::WriteArgs;
-use super::basis::Basis;
 use super::evidence::{Evidence, Past, StepFolder};
 use super::ledger::{before_file, read_before, return_owed_values};
 use super::robot_line::{
     LISTEN_NS, RobotLine, Surveys, deviations_table, drives, failed, prove_off, warn_of_interfaces,
 };
-use super::step::Step;
+use super::{args::WriteArgs, basis::Basis, step::Step};
 
 /// Configures the drives, and lists the changes.
 pub(crate) fn configure(args: &WriteArgs) -> Result<Exit, Failure> {

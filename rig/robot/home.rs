@@ -6,9 +6,8 @@ use masseter_terminal::{Exit, Failure, OrFailure, result_line};
 use serde::Serialize;
 use serde_json::json;
 
-use super::args::AxesArgs;
 use super::power_mark::{Homed, leave_mark};
-use super::{robot_line::failed, session::Session, step::Step};
+use super::{args::AxesArgs, robot_line::failed, session::Session, step::Step};
 
 /// The legs come first: a slide moves a leg whose length is known.
 const ORDER: [usize; AXES] = [3, 4, 5, 0, 1, 2];

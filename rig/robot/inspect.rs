@@ -19,11 +19,9 @@ use masseter_terminal::{Exit, Failure, OrFailure, Tone, result_with_tones};
 use serde::Serialize;
 use serde_json::json;
 
-use super::args::RobotArgs;
-use super::evidence::StepFolder;
 use super::ledger::{owed_advice, owed_axes};
 use super::robot_line::{RobotLine, axes_text, deviations_table, drives, failed};
-use super::step::Step;
+use super::{args::RobotArgs, evidence::StepFolder, step::Step};
 
 /// For how long the buses are listened to before the first question, ns.
 const LISTEN_NS: u64 = 2 * SECOND_NS;

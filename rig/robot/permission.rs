@@ -12,12 +12,11 @@ use masseter_terminal::status;
 use serde::{Deserialize, Serialize};
 use sha1::{Digest, Sha1};
 
-use super::basis::Basis;
 use super::evidence::{Past, StepFolder};
 use super::ledger::{owed_advice, owed_axes};
 use super::power_mark::{check_marks, marks_of_pose_check};
 use super::robot_line::{warn_of_gaps, warn_of_interfaces};
-use super::step::Step;
+use super::{basis::Basis, step::Step};
 
 /// Where the evidence of a run's robot is.
 const FOLDER: &str = "bringup";

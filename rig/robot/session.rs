@@ -12,13 +12,10 @@ use masseter_terminal::{Exit, Failure, OrFailure, status};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-use super::args::RobotArgs;
-use super::basis::Basis;
 use super::evidence::{Past, StepFolder};
 use super::ledger::{OwedFiles, return_owed_values};
-use super::power_mark::remove_mark;
 use super::robot_line::{LISTEN_NS, failed, wanted_drive, warn_of_gaps, warn_of_interfaces};
-use super::step::Step;
+use super::{args::RobotArgs, basis::Basis, power_mark::remove_mark, step::Step};
 
 /// All axes.
 const ALL: [usize; AXES] = [0, 1, 2, 3, 4, 5];

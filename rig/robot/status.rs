@@ -7,10 +7,7 @@ use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{Identity, Known};
 use masseter_terminal::{Exit, Tone, result, result_with_tones};
 
-use super::args::RobotArgs;
-use super::basis::Basis;
-use super::evidence::Past;
-use super::step::Step;
+use super::{args::RobotArgs, basis::Basis, evidence::Past, step::Step};
 use crate::BUILD;
 
 /// The arguments of `robot status` and `robot report`.

@@ -6,8 +6,7 @@ use masseter_terminal::{Exit, Failure, OrFailure, result_line};
 use serde::Serialize;
 use serde_json::json;
 
-use super::args::AxesArgs;
-use super::{session::Session, step::Step};
+use super::{args::AxesArgs, session::Session, step::Step};
 
 /// What is kept of one axis.
 #[derive(Debug, Serialize)]

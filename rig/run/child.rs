@@ -10,11 +10,9 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use masseter_runtime::clock;
 use masseter_runtime::conversation::{Conversation, Left, Limits, line};
 use masseter_runtime::lifecycle::{End, Order, Party, Report, ReportError, Silence};
-use masseter_runtime::named::Declared;
-use masseter_runtime::realtime::scheduling::Obtained;
+use masseter_runtime::{clock, named::Declared, realtime::scheduling::Obtained};
 use masseter_virtual_time::Requests;
 use rustix::process::{
     Pid, PidfdFlags, Resource, Rlimit, Signal, getrlimit, kill_process, pidfd_open, prlimit,

@@ -1,13 +1,9 @@
 //! The controller as the supervisor sees it: the rig's own process, a [program](Program) of the user, or none.
 
-use std::ffi::OsString;
-use std::io;
-use std::os::fd::OwnedFd;
+use std::{ffi::OsString, io, os::fd::OwnedFd};
 
-use masseter_runtime::clock;
-use masseter_runtime::lifecycle::attach::Invitation;
 use masseter_runtime::lifecycle::{End, Order};
-use masseter_runtime::transport::Domain;
+use masseter_runtime::{clock, lifecycle::attach::Invitation, transport::Domain};
 use masseter_terminal::Exit;
 
 use super::child::{CONTROLLER, Process, Ready, Reports, describe};

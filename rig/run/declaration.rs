@@ -1,17 +1,13 @@
 //! The signals and parameters that a controller declares. A program states them when it is ready: it is started for a
 //! scenario, without plant and recorder, and left before the first cycle.
 
-use std::fs;
-use std::path::absolute;
+use std::{fs, path::absolute};
 
 use anyhow::{Context, bail};
 use masseter_plan::RunPlan;
-use masseter_runtime::lifecycle::attach::Invitation;
-use masseter_runtime::named::Declared;
+use masseter_runtime::{lifecycle::attach::Invitation, named::Declared};
 
-use super::controller::Controller;
-use super::request::ControllerChoice;
-use super::supervisor::reserve_domain;
+use super::{controller::Controller, request::ControllerChoice, supervisor::reserve_domain};
 
 /// The declaration of this controller for a planned scenario.
 ///

@@ -1,17 +1,13 @@
 //! Requests to end a run: SIGINT, SIGTERM, and SIGHUP of a closed terminal.
 
-use std::fs;
-use std::io;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::{fs, io, sync::Arc};
 
 use anyhow::Context;
 use masseter_terminal::{Failure, OrFailure};
 use masseter_virtual_time::Requests;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-use signal_hook::flag;
-use signal_hook::iterator::Signals;
-use signal_hook::low_level::emulate_default_handler;
+use signal_hook::{flag, iterator::Signals, low_level::emulate_default_handler};
 
 /// The first signal requests an orderly stop, the second an immediate end.
 #[derive(Debug, Clone, Default)]

@@ -1,7 +1,6 @@
 //! A run with its folder: prepared, played into the folder, and reported from there.
 
-use std::fs::File;
-use std::path::Path;
+use std::{fs::File, path::Path};
 
 use anyhow::Context;
 use masseter_controller::process::BuildController;
@@ -15,13 +14,10 @@ use masseter_scenario::input::{MOST_KEPT_BYTES, foreign_text, read_bytes, read_t
 use masseter_scenario::{FileConfig, Scenario};
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 
-use super::interrupts::Interrupts;
 use super::request::{ClockKind, ControllerChoice, RunRequest, name_of};
-use super::resolve::resolve;
 use super::room::{self, Reserve};
-use super::supervisor;
-use crate::robot::Played;
-use crate::{BUILD, doctor};
+use super::{interrupts::Interrupts, resolve::resolve, supervisor};
+use crate::{BUILD, doctor, robot::Played};
 
 /// Where runs without `--out` go.
 const RUNS: &str = "runs";

@@ -4,20 +4,16 @@
 //! program that the user starts by hand, perhaps under a debugger, is waited for and never killed. The rig admits one
 //! program; it refuses any other with the reason.
 
-use std::ffi::OsString;
-use std::fs::File;
-use std::io;
 use std::os::fd::{AsFd, OwnedFd};
-use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{self, Child, Command, ExitStatus, Stdio};
+use std::{ffi::OsString, fs::File, io, os::unix::process::CommandExt};
 
 use anyhow::{Context, bail, ensure};
 use masseter_runtime::clock::{self, SECOND_NS};
-use masseter_runtime::conversation::Left;
 use masseter_runtime::lifecycle::attach::{Invitation, RIG_VARIABLE};
 use masseter_runtime::lifecycle::{End, Order, ReportError};
-use masseter_runtime::transport::Domain;
+use masseter_runtime::{conversation::Left, transport::Domain};
 use masseter_terminal::{Exit, status};
 use rustix::net::sockopt::socket_peercred;
 use rustix::process::{

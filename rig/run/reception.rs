@@ -6,10 +6,9 @@
 use std::os::unix::net::UnixListener;
 
 use anyhow::Context;
-use masseter_runtime::clock;
 use masseter_runtime::conversation::{Conversation, Left, Limits, Newcomers, line};
 use masseter_runtime::lifecycle::attach::{Answer, Hello, Invitation, socket};
-use masseter_runtime::transport::Domain;
+use masseter_runtime::{clock, transport::Domain};
 use masseter_terminal::{Refusals, status};
 
 /// Bytes of the longest greeting.

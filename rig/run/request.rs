@@ -1,10 +1,7 @@
 //! What a run is asked for, as the arguments of `masseter run` have it. The other verbs set some of it.
 
-use std::net::SocketAddr;
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::str::FromStr;
-use std::time::Duration;
+use std::{net::SocketAddr, os::unix::fs::PermissionsExt, str::FromStr, time::Duration};
 
 use anyhow::bail;
 use clap::{Args, ValueEnum};

@@ -1,7 +1,6 @@
 //! The plan and the clock of a run; refuses what this machine, the clock or the controller does not have.
 
-use std::path::Path;
-use std::thread;
+use std::{path::Path, thread};
 
 use anyhow::{bail, ensure};
 use masseter_controller::process::BuildController;

@@ -1,8 +1,7 @@
 //! Room for a run: memory, file size, disk and shared memory, checked before anything is armed.
 
 use std::fs::{self, OpenOptions};
-use std::io;
-use std::path::Path;
+use std::{io, path::Path};
 
 use anyhow::{Context, anyhow, ensure};
 use masseter_plan::RunPlan;

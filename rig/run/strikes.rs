@@ -4,18 +4,14 @@
 //! In real time the controller's stall is one of them. In simulated time the plant alone makes it, by withholding the
 //! commands.
 
-use std::fs;
-use std::os::fd::OwnedFd;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
-use std::thread;
-use std::time::Duration;
+use std::{fs, os::fd::OwnedFd, thread, time::Duration};
 
 use anyhow::{Context, bail};
 use masseter_recording::{ProcessFault, RunFolder};
-use masseter_runtime::clock;
-use masseter_runtime::lifecycle::Order;
 use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
+use masseter_runtime::{clock, lifecycle::Order};
 use masseter_scenario::{
     CommandFault, FaultConfig, FaultKindConfig, ProcessFault as Kind, RealtimeConfig, Scenario,
 };

@@ -3,9 +3,8 @@
 //!
 //! Counted from the first sample on, when the processes are in their steady state.
 
-use masseter_machine::SystemRoot;
-use masseter_machine::counters::ProcessCounters;
 use masseter_machine::counters::{Sample, Sampler};
+use masseter_machine::{SystemRoot, counters::ProcessCounters};
 use masseter_recording::{RunUsage, Usage};
 use masseter_runtime::clock::{self, SECOND_NS};
 

@@ -16,8 +16,7 @@ use masseter_plan::{Overrides, scenario_with_overrides};
 use masseter_recording::{FolderError, Manifest, ReadError, Reader, Recorded, RunFolder, Topic};
 use masseter_runtime::messages::codes::DriveState;
 use masseter_runtime::messages::{Command, Reading};
-use masseter_scenario::Scenario;
-use masseter_scenario::wording::counted;
+use masseter_scenario::{Scenario, wording::counted};
 use masseter_virtual_time::{Requests, Rig, RigError};
 use serde::Serialize;
 

@@ -2,10 +2,9 @@
 //!
 //! [`masseter_campaign`] holds cases, results and their folder. Under virtual time a case needs no recording.
 
-use std::fs;
-use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::{fs, path::Path};
 
 use anyhow::{Context, anyhow};
 use clap::ValueEnum;

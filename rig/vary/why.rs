@@ -8,22 +8,19 @@
 #[cfg(test)]
 mod tests;
 
-use std::iter;
-use std::path::Path;
+use std::{iter, path::Path};
 
 use anyhow::{Context, ensure};
 use masseter_controller::process::BuildController;
-use masseter_judge::signals::Registry;
-use masseter_judge::{Check, CheckResult, EventRecord, Figures, Verdict, Watch};
+use masseter_judge::{Check, CheckResult, EventRecord, Figures, Verdict, Watch, signals::Registry};
 use masseter_plan::{Overrides, RunPlan, scenario_with_overrides};
 use masseter_recording::{Manifest, RunFolder, manifest_of};
 use masseter_report::why::{Detected, Instant, Interval, Left, Look, Why};
 use masseter_runtime::injection::{Injected, Withdrawn};
 use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind};
 use masseter_runtime::named::Declared;
-use masseter_scenario::Scenario;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
-use masseter_scenario::wording::counted;
+use masseter_scenario::{Scenario, wording::counted};
 use masseter_terminal::Exit;
 use masseter_virtual_time::{Branches, Mark, Requests, Run, Without};
 

@@ -7,12 +7,11 @@
 use masseter_model::geometry::{Actuators, LEGS, Mechanism};
 use nalgebra::{Matrix3, Vector3};
 
-use super::certificate::Certificate;
 use super::elimination::{Elimination, NEARLY_SINGULAR, SolutionFilter};
-use super::equations::Equations;
 use super::legs::{LegAngle, coincide, each, separation_rad};
 use super::loop_equations::{LoopEquations, LoopSolution};
 use super::solution::{Assembly, Condition, ForwardError, Solution};
+use super::{certificate::Certificate, equations::Equations};
 
 /// The most solutions of one input; they come in mirrored pairs.
 pub const MOST_SOLUTIONS: usize = 16;

@@ -12,11 +12,10 @@
 
 use masseter_model::geometry::{Actuators, LEGS, Mechanism};
 
-use super::elimination::SolutionFilter;
 use super::legs::{Anchor, LegAngle, each};
-use super::loop_equations::LoopEquations;
 use super::solution::{Condition, ForwardError, Solution};
 use super::solutions::{LoopSolutions, assembly, check_input, nearest_other_rad};
+use super::{elimination::SolutionFilter, loop_equations::LoopEquations};
 
 /// Newton's iterations from the last solution; a chewing jaw takes 2 or 3 a millisecond.
 const WARM_ITERATIONS: u32 = 4;

@@ -10,8 +10,7 @@ use masseter_model::geometry::{
 };
 use masseter_scenario::TrajectoryLimitsConfig;
 
-use super::TrajectoryError;
-use super::motion::Trajectory;
+use super::{TrajectoryError, motion::Trajectory};
 use crate::kinematics::Assembly;
 
 /// The demands of a trajectory on the axes, in the order d₁ d₂ d₃ l₁ l₂ l₃.

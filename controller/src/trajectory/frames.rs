@@ -14,12 +14,8 @@ use masseter_scenario::{FileConfig, JawConfig};
 use nalgebra::{Matrix3, UnitQuaternion};
 use serde::Serialize;
 
-use super::TrajectoryError;
-use super::doubts::largest;
 use super::import::{Axes, SIGNED_AXES, Source};
-use super::mandible::condylar_middle;
-use super::row::Located;
-use super::table::Format;
+use super::{TrajectoryError, doubts::largest, mandible::condylar_middle, row::Located, table::Format};
 
 /// A turn moves the incisal point by this length a radian, m.
 const LEVER_M: f64 = 0.08;

@@ -11,13 +11,10 @@ use masseter_scenario::input::{foreign_text, read_bytes};
 use masseter_scenario::{FileConfig, JawConfig};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 
-use super::c3d;
-use super::mandible::condylar_middle;
-use super::markers::Body;
 use super::recording::{Recording, Sample};
 use super::row::{Located, Row};
 use super::table::{Format, LARGEST_MM, Table};
-use super::{TrajectoryError, ranges_of, require};
+use super::{TrajectoryError, c3d, mandible::condylar_middle, markers::Body, ranges_of, require};
 
 /// The names of a file's axes, each with its direction.
 pub(super) const SIGNED_AXES: [&str; 6] = ["+x", "-x", "+y", "-y", "+z", "-z"];

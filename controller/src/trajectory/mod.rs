@@ -27,8 +27,7 @@ mod survey;
 mod table;
 mod units;
 
-use masseter_model::geometry::Pose;
-use masseter_model::section;
+use masseter_model::{geometry::Pose, section};
 use nalgebra::UnitQuaternion;
 
 pub use check::{TrajectoryReport, check};

@@ -3,9 +3,7 @@
 //! Formats with a head of their own are TRC (markers of motion laboratories), and MOT and STO (OpenSim). Lines that
 //! begin with `#` are comments. The module reads no numbers.
 
-use masseter_scenario::input::excerpt;
-use masseter_scenario::wording::counted;
-use masseter_scenario::{AngleUnit, LengthUnit, TimeUnit};
+use masseter_scenario::{AngleUnit, LengthUnit, TimeUnit, input::excerpt, wording::counted};
 
 use super::columns::{Column, Meaning};
 use super::row::{Located, is_lost};

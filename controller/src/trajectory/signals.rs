@@ -6,9 +6,7 @@ use std::sync::Arc;
 
 use masseter_scenario::{FileConfig, JawConfig};
 
-use super::TrajectoryError;
-use super::import::Source;
-use super::table::LARGEST_GAP_S;
+use super::{TrajectoryError, import::Source, table::LARGEST_GAP_S};
 
 /// Largest difference of times by rounding, s.
 const SAME_TIME_S: f64 = 1e-6;

@@ -2,20 +2,15 @@
 //!
 //! A row without a whole pose is a gap. The frame of the jaw is not part of this module.
 
-use std::fmt::Write;
-use std::path::Path;
+use std::{fmt::Write, path::Path};
 
-use masseter_scenario::FileConfig;
-use masseter_scenario::input::excerpt;
-use masseter_scenario::wording::counted;
+use masseter_scenario::{FileConfig, input::excerpt, wording::counted};
 use nalgebra::{Matrix3, Rotation3, UnitQuaternion, Vector3};
 
-use super::doubts::upper_median;
-use super::extras::Extras;
 use super::layout::{Clock, Content, Layout, Scaled, Turn};
 use super::markers::{Body, settle};
 use super::row::{Located, Row, gaps, is_lost};
-use super::sheet::Sheet;
+use super::{doubts::upper_median, extras::Extras, sheet::Sheet};
 
 /// Least rows of a motion.
 const FEWEST_ROWS: usize = 4;

@@ -1,8 +1,7 @@
 //! Deviations of a drive from the standard, as real drives have them, and what each changes.
 
 use masseter_can::canopen::{AbortCode, CobId, ObjectAddress};
-use serde::de::Error;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
 use crate::dictionary::{Objects, Overlay, find};
 use crate::names;

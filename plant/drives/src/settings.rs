@@ -3,13 +3,9 @@
 use masseter_can::PdoMapping;
 use masseter_can::canopen::{AbortCode, NodeId, ObjectAddress};
 
-use crate::MILLISECOND_NS;
-use crate::axis::parameters::configure;
-use crate::dictionary::Objects;
 use crate::memory::{DriveMemory, MemoryError};
-use crate::names;
 use crate::quirks::{Delivered, Quirk};
-use crate::ratings::Ratings;
+use crate::{MILLISECOND_NS, axis::parameters::configure, dictionary::Objects, names, ratings::Ratings};
 
 /// The usual node of a master.
 const MASTER: NodeId = match NodeId::new(127) {

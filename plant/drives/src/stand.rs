@@ -8,9 +8,8 @@ use masseter_can::{
     Bitrate, Bus, CanId, ErrorState, Frame, Port, ReceiveError, Tapped, VirtualWire, WireConfig,
 };
 
-use crate::axis::encoder::Look;
-use crate::node::DriveNode;
 use crate::settings::{DriveSettings, SettingsError};
+use crate::{axis::encoder::Look, node::DriveNode};
 
 /// Frames that a port can hold for sending, and for receiving between two looks; a millisecond holds 21.
 const TRANSMIT_CAPACITY: usize = 64;

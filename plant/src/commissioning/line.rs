@@ -6,11 +6,10 @@ use std::fmt::{self, Debug, Formatter};
 use std::io;
 use std::io::Write;
 
-use masseter_can::Frame;
 use masseter_can::canopen::{
     AbortCode, Expedited, Nmt, NmtCommand, NmtTarget, NodeId, ObjectAddress, SdoRequest, sync,
 };
-use masseter_can::cia402::Controlword;
+use masseter_can::{Frame, cia402::Controlword};
 use masseter_model::geometry::AXES;
 use masseter_runtime::clock::MILLISECOND_NS;
 use masseter_scenario::{MASTER_NODE, ObjectKey, Scenario};
@@ -19,10 +18,9 @@ use serde::{Deserialize, Serialize};
 use super::line_error::{LineError, MasterSign, Restarted};
 use super::object_words::SdoReason;
 use super::traffic::{Heard, Strangers, Traffic};
-use crate::error::PlantError;
-use crate::master::link::Address;
 use crate::master::sdo::{SdoClient, SdoFailure, number};
 use crate::master::wanted::{is_write_only, shown_bits};
+use crate::{error::PlantError, master::link::Address};
 
 /// Silence of a server before the repetition of a request.
 const TIMEOUT_NS: u64 = 500 * MILLISECOND_NS;

@@ -6,14 +6,13 @@ use masseter_model::geometry::AXES;
 use masseter_runtime::clock::SECOND_NS;
 use masseter_scenario::{AxisScale, DriveProfile, MASTER_NODE, ObjectKey, ObjectRule, Scenario};
 
-use super::line::Line;
-use super::line_error::LineError;
 use super::loan::{Borrowed, Loan};
 use super::motion_error::{AxisError, MotionError, StopCause};
 use super::watch::{
     Bounds, Sample, Watch, read_position, seconds, stop_drive, switch_off_drive, switch_on_drive,
     wait_for_mode,
 };
+use super::{line::Line, line_error::LineError};
 use crate::master::wanted::OFFSETS;
 
 /// Profile position and homing (6060h).

@@ -8,9 +8,7 @@ use masseter_can::canopen::{Expedited, ObjectAddress};
 use masseter_scenario::{ObjectKey, ObjectRule};
 use serde::{Deserialize, Serialize};
 
-use super::line::Line;
-use super::line_error::LineError;
-use super::object_words::SdoReason;
+use super::{line::Line, line_error::LineError, object_words::SdoReason};
 use crate::master::sdo::number;
 use crate::master::wanted::{PdoLayout, PdoSetting, Setting, WantedDrive, may_keep};
 

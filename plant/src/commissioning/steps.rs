@@ -7,11 +7,8 @@ use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_scenario::{Scenario, StoreConfig};
 use serde::Serialize;
 
-use super::line::Line;
-use super::line_error::LineError;
-use super::motion_error::MotionError;
-use super::object_words::SdoReason;
 use super::watch::{read_position, read_state};
+use super::{line::Line, line_error::LineError, motion_error::MotionError, object_words::SdoReason};
 
 /// Time of the watch over an axis, ns.
 const WATCH_NS: u64 = 200 * MILLISECOND_NS;

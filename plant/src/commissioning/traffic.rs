@@ -2,8 +2,7 @@
 //!
 //! The buses are simulated ones with the emulated drives, or real interfaces, each with its clock.
 
-use std::collections::BTreeSet;
-use std::io::Write;
+use std::{collections::BTreeSet, io::Write};
 
 use masseter_can::canopen::{Cob, Emergency, Heartbeat, NmtState, SdoResponse};
 use masseter_can::wire::{Bitrate, INTERFRAME_BITS, frame_bits};
@@ -13,10 +12,10 @@ use masseter_runtime::clock::{self, MILLISECOND_NS};
 use masseter_scenario::{MASTER_NODE, Scenario};
 
 use super::line_error::{LineError, MasterSign, OtherMaster};
-use crate::error::PlantError;
 use crate::master::link::{Address, Buses, Link, addresses, sender};
-use crate::master::sockets::SocketLink;
-use crate::simulator::emulation::virtual_link::VirtualLink;
+use crate::{
+    error::PlantError, master::sockets::SocketLink, simulator::emulation::virtual_link::VirtualLink,
+};
 
 /// Time between two looks at the buses, ns.
 const STEP_NS: u64 = MILLISECOND_NS;

@@ -6,8 +6,7 @@ use masseter_scenario::{
 };
 
 use super::deviation::{Deviation, Outcome};
-use super::object_words::value_text;
-use super::settings::Survey;
+use super::{object_words::value_text, settings::Survey};
 
 /// Degrees, tenths of a degree and turns of the screw; millimetres and micrometres (CiA 303-2).
 const DEGREES: u32 = 0x0041_0000;

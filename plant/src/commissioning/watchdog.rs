@@ -14,16 +14,12 @@ use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_scenario::Scenario;
 use serde::{Deserialize, Serialize};
 
-use super::line::Line;
-use super::line_error::LineError;
-use super::loan::Loan;
 use super::motion_error::{AxisError, MotionError, Silence, StopCause};
 use super::mover::{Caution, Mover, Operator, POSITIONING, Wish};
-use super::object_words::SdoReason;
-use super::steps::START_NS;
 use super::watch::{
     TRANSITION_NS, disable_voltage, read_error_code, read_state, stop_drive, wait_for_state, watch_unpowered,
 };
+use super::{line::Line, line_error::LineError, loan::Loan, object_words::SdoReason, steps::START_NS};
 use crate::master::wanted::{WantedDrive, rpdo_timeout_ms};
 
 /// How much longer than its time a drive may take: some drives look every few milliseconds, and the statusword comes by SDO.

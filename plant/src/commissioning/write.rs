@@ -6,11 +6,9 @@ use masseter_runtime::clock::MILLISECOND_NS;
 use masseter_scenario::{DriveProfile, ObjectKey, ObjectRule};
 use serde::Serialize;
 
-use super::deviation::as_text;
-use super::line::Line;
-use super::line_error::LineError;
 use super::object_words::{object_name, value_text};
 use super::settings::{Settings, Survey};
+use super::{deviation::as_text, line::Line, line_error::LineError};
 use crate::master::wanted::{COB_ID_BITS, PdoSetting, Setting, may_keep};
 
 /// Longest time of a drive to become pre-operational, ns.

@@ -4,8 +4,7 @@
 //! [`WantedDrive`] decides the values of the objects. The plan executes nothing; the [boot](super::boot) executes the
 //! plan.
 
-use masseter_can::canopen::ObjectAddress;
-use masseter_can::cia402::Controlword;
+use masseter_can::{canopen::ObjectAddress, cia402::Controlword};
 use masseter_runtime::messages::codes::{BootPhase, Cause};
 use masseter_scenario::{AccelerationUnit, ObjectKey, ObjectRule};
 

@@ -9,18 +9,13 @@ use masseter_can::canopen::{
 };
 use masseter_can::cia402::{Controlword, DriveRequest, DriveState, Statusword, next_controlword};
 use masseter_can::{CanId, Frame, PdoMapping, Rpdo1, Tpdo1};
-use masseter_runtime::clock::MILLISECOND_NS;
-use masseter_runtime::messages::Reading;
 use masseter_runtime::messages::codes::{BootPhase, Cause, drive_state_code};
+use masseter_runtime::{clock::MILLISECOND_NS, messages::Reading};
 use masseter_scenario::{AxisScale, Scenario};
 
 use super::boot::{Boot, late};
-use super::events::Failure;
-use super::following::Following;
-use super::gate::Target;
-use super::link::Address;
 use super::presence::{MISSING_CYCLES, Presence};
-use super::wanted::WantedDrive;
+use super::{events::Failure, following::Following, gate::Target, link::Address, wanted::WantedDrive};
 use crate::error::PlantError;
 
 /// One drive.

@@ -7,9 +7,7 @@ use masseter_can::canopen::{NodeId, sync};
 use masseter_can::wire::{INTERFRAME_BITS, frame_bits};
 use masseter_can::{BitrateError, ErrorState, SendError};
 use masseter_model::geometry::AXES;
-use masseter_runtime::clock::MILLISECOND_NS;
-use masseter_runtime::messages::Reading;
-use masseter_runtime::realtime::Wake;
+use masseter_runtime::{clock::MILLISECOND_NS, messages::Reading, realtime::Wake};
 use masseter_scenario::CanConfig;
 
 /// Times of the present cycle.

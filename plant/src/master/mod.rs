@@ -28,8 +28,7 @@ pub mod wanted;
 mod tests;
 
 use masseter_can::canopen::{Cob, Heartbeat, NmtState, sync};
-use masseter_can::wire::worst_case_bits;
-use masseter_can::{Bus, FULL_QUEUE, Frame, ReceiveError, Received, SendError};
+use masseter_can::{Bus, FULL_QUEUE, Frame, ReceiveError, Received, SendError, wire::worst_case_bits};
 use masseter_model::geometry::AXES;
 use masseter_runtime::messages::codes::{
     BootPhase, Cause, DriveRequest, DriveState, EventKind, Source, drive_state_code,

@@ -4,19 +4,15 @@
 //! sockets. Abstract sockets belong to a network namespace, as interfaces do, and end with their process. The lock does
 //! not exclude masters of other programs or other computers; the master notices those by their frames.
 
-use std::io::ErrorKind;
-use std::ops::Range;
-use std::os::linux::net::SocketAddrExt;
 use std::os::unix::net::{SocketAddr, UnixDatagram};
+use std::{io::ErrorKind, ops::Range, os::linux::net::SocketAddrExt};
 
 use masseter_can::faults::FaultNote;
 use masseter_can::{
     Bus, InterfaceNeeds, JudgedInterface, OpenError, PortFaults, ReceiveError, SocketCan, Tapped,
 };
 use masseter_model::geometry::AXES;
-use masseter_runtime::clock;
-use masseter_runtime::injection::Injected;
-use masseter_runtime::realtime::Waiter;
+use masseter_runtime::{clock, injection::Injected, realtime::Waiter};
 use masseter_scenario::{CanConfig, MASTER_NODE, Scenario};
 
 use super::link::{Buses, Link, MASTER_PORT, check_quantities, fault_seed, faults_of_bus, restart_after_ns};

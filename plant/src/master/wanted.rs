@@ -7,8 +7,7 @@
 mod tests;
 
 use masseter_can::canopen::{AbortCode, Cob, CobId, NodeId, ObjectAddress};
-use masseter_can::cia402::interpolation_period;
-use masseter_can::{CanId, EVERY_SYNC, PdoMapping};
+use masseter_can::{CanId, EVERY_SYNC, PdoMapping, cia402::interpolation_period};
 use masseter_model::geometry::LEGS;
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_scenario::{

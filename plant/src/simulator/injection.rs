@@ -13,10 +13,8 @@ use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::messages::{Command, Event, LAYOUT_VERSION};
 use masseter_scenario::{CommandFault, FaultConfig, FaultKindConfig, Scenario};
 
-use crate::error::PlantError;
-use crate::master::events::Journal;
 use crate::master::link::{Mishap, Occurrence};
-use crate::state::state;
+use crate::{error::PlantError, master::events::Journal, state::state};
 
 /// Follows the occurrences from which times count, hands out every window once, and alters commands.
 #[derive(Debug, Clone)]

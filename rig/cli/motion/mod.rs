@@ -17,8 +17,7 @@ use masseter_plan::{Overrides, scenario_with_overrides};
 use masseter_scenario::MotionConfig;
 use masseter_terminal::{Exit, Format, Tone, result, result_with_tones};
 
-use self::description::describe;
-use self::found::Found;
+use self::{description::describe, found::Found};
 
 const TONES: [(&str, Tone); 4] =
     [("PLAYS", Tone::Good), ("suggest", Tone::Good), ("warning", Tone::Doubtful), ("REFUSED", Tone::Bad)];

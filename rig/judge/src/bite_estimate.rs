@@ -5,8 +5,7 @@ use hdrhistogram::Histogram;
 use masseter_runtime::named::Declared;
 use serde::{Deserialize, Serialize};
 
-use crate::poses::is_running;
-use crate::signals::CycleMessages;
+use crate::{poses::is_running, signals::CycleMessages};
 
 /// The signals of the estimate and of its uncertainty.
 const SIGNALS: [&str; 2] = ["bite_force_n", "bite_force_uncertainty_n"];

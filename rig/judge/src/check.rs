@@ -3,13 +3,11 @@
 
 use std::borrow::Cow;
 
-use masseter_scenario::wording::counted;
-use masseter_scenario::{ChecksConfig, ExpectConfig, FaultConfig};
+use masseter_scenario::{ChecksConfig, ExpectConfig, FaultConfig, wording::counted};
 use serde::Serialize;
 
 use crate::breach::{Bound, Breach, is_within};
-use crate::declared_faults::FaultFigures;
-use crate::tracking::PoseErrors;
+use crate::{declared_faults::FaultFigures, tracking::PoseErrors};
 
 /// The result of a check.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

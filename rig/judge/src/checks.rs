@@ -6,10 +6,8 @@
 
 use masseter_recording::{Ending, Manifest};
 use masseter_runtime::messages::codes::{Cause, ControllerState};
-use masseter_runtime::named::PlayedMotion;
-use masseter_runtime::schedule::CycleSchedule;
-use masseter_scenario::wording::counted;
-use masseter_scenario::{Dimension, ExpectedVerdict, StimulusConfig};
+use masseter_runtime::{named::PlayedMotion, schedule::CycleSchedule};
+use masseter_scenario::{Dimension, ExpectedVerdict, StimulusConfig, wording::counted};
 
 use crate::breach::Breach;
 use crate::check::{Check, CheckFigures, CheckResult, Subject, faults, tracking};

@@ -6,8 +6,7 @@ use masseter_runtime::messages::codes::{Cause, Source};
 use serde::Serialize;
 
 use crate::events::{Code, EventRecord};
-use crate::poses::worse;
-use crate::tracking::PathSample;
+use crate::{poses::worse, tracking::PathSample};
 
 /// A declared fault and its effect.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]

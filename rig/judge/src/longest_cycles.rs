@@ -9,8 +9,7 @@ use masseter_runtime::messages::{Command, Machine, Reading, State};
 use serde::Serialize;
 
 use crate::intervals::{Answer, Answers};
-use crate::measured::Durations;
-use crate::series::ByCycle;
+use crate::{measured::Durations, series::ByCycle};
 
 /// A cycle's path, joined from messages of both processes.
 #[derive(Debug, Clone, Copy)]

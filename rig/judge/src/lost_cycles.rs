@@ -3,8 +3,7 @@
 //! Who caused a loss is not decided here; see [`OverrunAttribution`](crate::OverrunAttribution). Cycles lost to stalls that
 //! the scenario makes are neither the machine's nor the rig's.
 
-use std::collections::VecDeque;
-use std::ops::Range;
+use std::{collections::VecDeque, ops::Range};
 
 use masseter_recording::ProcessFault;
 use masseter_runtime::messages::codes::ControllerState;

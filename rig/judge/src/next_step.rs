@@ -5,12 +5,9 @@ use masseter_runtime::messages::codes::Cause;
 use masseter_scenario::ExpectedVerdict::{Died, Fail, Incomplete, Interrupted, Pass, SafeStop, Untested};
 use masseter_scenario::Scenario;
 
-use crate::breach::Breach;
 use crate::check::{Check, Subject};
-use crate::checks::lag_cause;
-use crate::events::Code;
-use crate::figures::Figures;
 use crate::outcome::{Outcome, clock_jump};
+use crate::{breach::Breach, checks::lag_cause, events::Code, figures::Figures};
 
 /// Declares the steps, each with its sentence.
 macro_rules! next_steps {

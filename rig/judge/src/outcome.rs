@@ -11,12 +11,10 @@ use masseter_scenario::{CanConfig, Scenario};
 use masseter_terminal::Exit;
 
 use crate::checks::{is_often_late, lag_cause};
-use crate::events::EventRecord;
-use crate::figures::Figures;
-use crate::lost_cycles::Outage;
 use crate::played::{MotionFigures, StoppedBy};
-use crate::shortfall::Shortfall;
-use crate::timing::Timing;
+use crate::{
+    events::EventRecord, figures::Figures, lost_cycles::Outage, shortfall::Shortfall, timing::Timing,
+};
 
 /// The outcome of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,9 +4,8 @@ use masseter_can::{Bitrate, Tapped, wire};
 use masseter_model::geometry::{AXES, Pose};
 use masseter_runtime::messages::{MOST_VALUES, Reading, Signals, Truth};
 
-use crate::poses::place;
 use crate::series::{Curve, Extremes, Series, Smoothing};
-use crate::tracking::PathSample;
+use crate::{poses::place, tracking::PathSample};
 
 /// A run over time, from the first message to the last: seconds since its first SYNC, and the lowest and the highest value
 /// of each stretch of time.

@@ -12,9 +12,8 @@ use masseter_scenario::Scenario;
 use serde::Serialize;
 
 use crate::ahead::{AheadWatch, Points};
-use crate::events::EventRecord;
 use crate::poses::{are_enabled, is_moving, is_running, way};
-use crate::tracking::PathSample;
+use crate::{events::EventRecord, tracking::PathSample};
 
 /// The played part of the scenario's motion.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]

@@ -8,18 +8,16 @@
 //! SYNC and the machine's lost cycles cost. Before the motion, and in an own motion, the controller's desired pose counts. After the motion the last pose
 //! stays. Where the machine loses cycles while the rate of the motion changes, the pose is not exactly the controller's.
 
-use masseter_controller::playback::Playback;
-use masseter_controller::trajectory::Trajectory;
+use masseter_controller::{playback::Playback, trajectory::Trajectory};
 use masseter_model::geometry::{Mechanism, Pose};
 use masseter_runtime::messages::codes::Cause;
 use masseter_runtime::messages::{Parameters, Reading, State, pose_fields};
 use masseter_runtime::named::{Declared, PlayedMotion};
 use masseter_scenario::Scenario;
 
-use crate::events::EventRecord;
-use crate::jaw_cycles::MotionSpeed;
 use crate::order::{Disorder, StateOrder};
 use crate::poses::{desired_pose, is_moving, is_running};
+use crate::{events::EventRecord, jaw_cycles::MotionSpeed};
 
 /// What the messages of a sample say of the motion.
 #[derive(Debug, Clone, Copy)]

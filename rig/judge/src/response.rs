@@ -6,12 +6,9 @@
 //! A stall queues messages far off their times. The bound does not hold for the frames of that cycle and of the next
 //! two. They are counted and not judged.
 
-use masseter_can::canopen::Cob;
-use masseter_can::{BusPlan, CanId, PeriodicMessage, PlannedMessage, Tapped};
-use masseter_runtime::messages::FrameTap;
-use masseter_runtime::schedule::plans;
-use masseter_scenario::Scenario;
-use masseter_scenario::wording::counted;
+use masseter_can::{BusPlan, CanId, PeriodicMessage, PlannedMessage, Tapped, canopen::Cob};
+use masseter_runtime::{messages::FrameTap, schedule::plans};
+use masseter_scenario::{Scenario, wording::counted};
 use serde::Serialize;
 
 /// The longest response time of a message.

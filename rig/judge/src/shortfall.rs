@@ -4,16 +4,11 @@
 use std::fmt::{self, Display, Formatter};
 
 use masseter_recording::{Ending, Manifest};
-use masseter_runtime::control::Deadline;
 use masseter_runtime::messages::codes::{Cause, ControllerState};
-use masseter_runtime::named::PlayedMotion;
+use masseter_runtime::{control::Deadline, named::PlayedMotion};
 use masseter_scenario::ExpectedVerdict;
 
-use crate::breach::Breach;
-use crate::check::CheckResult;
-use crate::figures::Figures;
-use crate::order::Disorder;
-use crate::played::StoppedBy;
+use crate::{breach::Breach, check::CheckResult, figures::Figures, order::Disorder, played::StoppedBy};
 
 /// Share of the motion that the jaw must go.
 const WHOLE: f64 = 0.95;

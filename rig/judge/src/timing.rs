@@ -8,9 +8,8 @@ use masseter_recording::Manifest;
 use masseter_scenario::wording::{counted, grouped};
 use serde::Serialize;
 
-use crate::figures::Figures;
 use crate::overruns::{Overrun, OverrunCause};
-use crate::skips::OverrunAttribution;
+use crate::{figures::Figures, skips::OverrunAttribution};
 
 /// Whether the deadlines were kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -2,14 +2,11 @@
 //! and forward kinematics' estimate on the robot, whose true pose is unknown.
 
 use masseter_model::geometry::{Deviation, Pose};
-use masseter_runtime::clock::SECOND_NS;
-use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::{clock::SECOND_NS, messages::codes::ControllerState};
 use serde::Serialize;
 
-use crate::measured::standard_error;
 use crate::poses::{desired_pose, deviation, estimated_pose, is_moving, is_running, true_pose, worse};
-use crate::signals::Sample;
-use crate::statistic::Sums;
+use crate::{measured::standard_error, signals::Sample, statistic::Sums};
 
 /// Where the actual pose comes from, which the desired pose is compared with.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]

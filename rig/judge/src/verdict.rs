@@ -10,14 +10,12 @@ use serde::Serialize;
 
 use crate::breach::{Breach, earliest};
 use crate::check::{Check, CheckResult, Subject};
-use crate::checks::checks;
-use crate::figures::Figures;
-use crate::next_step::NextStep;
 use crate::outcome::{
     Outcome, OutcomeReason, account, clock_jump, declared_cause, ending, excuse, incomplete, overload,
     passed, stopped_by_stimulus, when_died, with_shortfall,
 };
 use crate::timing::{Timing, TimingWord};
+use crate::{checks::checks, figures::Figures, next_step::NextStep};
 
 /// The judgement of a run.
 ///

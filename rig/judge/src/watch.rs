@@ -3,13 +3,10 @@
 use masseter_model::geometry::Pose;
 use masseter_recording::Recorded;
 use masseter_runtime::named::Declared;
-use masseter_scenario::Scenario;
-use masseter_scenario::input::excerpt;
+use masseter_scenario::{Scenario, input::excerpt};
 
-use crate::events::EventRecord;
-use crate::poses::is_running;
-use crate::requirements::Requirements;
 use crate::signals::{CycleMessages, Pace, Registry, Timeline, UnknownSignal, Values};
+use crate::{events::EventRecord, poses::is_running, requirements::Requirements};
 
 /// The scenario has no requirement of that name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]

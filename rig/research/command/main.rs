@@ -5,10 +5,7 @@
 
 mod uniqueness;
 
-use std::fs;
-use std::path::PathBuf;
-use std::process::ExitCode;
-use std::sync::Arc;
+use std::{fs, path::PathBuf, process::ExitCode, sync::Arc};
 
 use anyhow::Context;
 use clap::{Args, Parser, Subcommand};
@@ -17,8 +14,7 @@ use masseter_recording::new_folder;
 use masseter_research::{Settings, Study};
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, in_one_line, result_line, status};
-use rustix::fs::Mode;
-use rustix::process::umask;
+use rustix::{fs::Mode, process::umask};
 
 use uniqueness::{UniquenessVerb, uniqueness};
 

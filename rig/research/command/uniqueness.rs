@@ -3,9 +3,8 @@
 //!
 //! Both are about the published mechanism; a proof around a motion is about its scenario's mechanism.
 
-use std::fs::File;
-use std::io::Write;
 use std::path::{Path, PathBuf};
+use std::{fs::File, io::Write};
 
 use anyhow::Context;
 use clap::{Args, Subcommand, ValueEnum};

@@ -2,8 +2,7 @@
 //!
 //! Each case draws from a generator of its own, so that the order in which cores take them changes nothing.
 
-use std::collections::BTreeMap;
-use std::f64::consts::PI;
+use std::{collections::BTreeMap, f64::consts::PI};
 
 use masseter_controller::kinematics::{Assembly, MAX_ITERATIONS};
 use masseter_model::geometry::{Actuators, LEGS, Mechanism};

@@ -1,9 +1,8 @@
 //! Tells the rig a digest of the sources that a state and its bytes depend on: files of snapshots carry it.
 
-use std::fs;
 use std::hash::{DefaultHasher, Hash, Hasher};
-use std::io;
 use std::path::{Path, PathBuf};
+use std::{fs, io};
 
 /// Where these sources are, from this package.
 const FOLDERS: [&str; 6] = [

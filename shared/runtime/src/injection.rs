@@ -9,10 +9,9 @@ use std::ops::Range;
 
 use masseter_scenario::{CommandFault, Scenario, ScenarioError, Start, StimulusConfig, When};
 
-use crate::clock::SECOND_NS;
-use crate::messages::Event;
 use crate::messages::codes::{Cause, ControllerState, EventKind, OF_OPERATOR, Source};
 use crate::named::{Declared, NameError};
+use crate::{clock::SECOND_NS, messages::Event};
 
 /// A fault or a stimulus, with its place in the scenario's list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]

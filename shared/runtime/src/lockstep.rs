@@ -5,8 +5,7 @@
 //! for a silent process ends after the [`Patience`], for the plant after twice that. The waiting process reports the
 //! silence to the supervisor and goes on alone, in real time, so that its watchdogs end the run.
 
-use std::mem;
-use std::time::Duration;
+use std::{mem, time::Duration};
 
 use crate::clock;
 use crate::lifecycle::{

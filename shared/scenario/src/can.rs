@@ -2,8 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use masseter_can::canopen::NodeId;
-use masseter_can::{Bitrate, BitrateError};
+use masseter_can::{Bitrate, BitrateError, canopen::NodeId};
 use masseter_model::geometry::AXES;
 
 use super::error::{Checked, ScenarioError, ranges_of, require};

@@ -2,8 +2,7 @@
 //! `[checks]`.
 
 use masseter_can::codes;
-use masseter_model::dynamics::DynamicsConfig;
-use masseter_model::geometry::LEGS;
+use masseter_model::{dynamics::DynamicsConfig, geometry::LEGS};
 use serde::{Deserialize, Serialize};
 
 use super::error::{Checked, LONGEST_S, ranges_of, require};

@@ -1,18 +1,15 @@
 //! A scenario's text as a tree of TOML, with the places of its keys. The refusal of a malformed file has place and key,
 //! in the words of the documents.
 
-use std::borrow::Cow;
-use std::path::Path;
+use std::{borrow::Cow, path::Path};
 
-use serde::Deserialize;
-use serde::de::DeserializeOwned;
+use serde::{Deserialize, de::DeserializeOwned};
 use serde_json::Value;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer, Error};
 
 use super::error::ScenarioError;
-use crate::input::excerpt;
-use crate::wording::question;
+use crate::{input::excerpt, wording::question};
 
 /// More keys than any table has.
 const MOST_SUSPECTS: usize = 100;

@@ -3,8 +3,7 @@
 use std::path::PathBuf;
 
 use masseter_model::geometry::{AXIS_NAMES, LEGS};
-use serde::de::Error;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, de::Error};
 use toml::Table;
 
 use super::drive_profile::{AccelerationUnit, DriveProfile, VelocityUnit};

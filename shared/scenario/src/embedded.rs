@@ -3,8 +3,7 @@
 //! This crate compiles the code that reads and writes a scenario once. The derived code is generic, so each crate with
 //! an embedded scenario would compile the code again.
 
-use serde::de::Error;
-use serde::{Deserializer, Serializer};
+use serde::{Deserializer, Serializer, de::Error};
 
 use crate::Scenario;
 

@@ -1,11 +1,9 @@
 //! The reasons for the refusal of a scenario, and the checks that many of its values share.
 
-use std::fmt::Display;
-use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+use std::{fmt::Display, ops::RangeInclusive};
 
-use masseter_model::geometry::AXIS_NAMES;
-use masseter_model::section::Range;
+use masseter_model::{geometry::AXIS_NAMES, section::Range};
 use serde::Serialize;
 
 use crate::input::{excerpt, read_text};

@@ -2,8 +2,7 @@
 
 use std::fs::{File, OpenOptions};
 use std::io::{self, ErrorKind, Read};
-use std::os::unix::fs::OpenOptionsExt;
-use std::path::Path;
+use std::{os::unix::fs::OpenOptionsExt, path::Path};
 
 use rustix::fs::OFlags;
 

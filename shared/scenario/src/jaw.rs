@@ -6,8 +6,7 @@
 use std::collections::BTreeSet;
 
 use masseter_model::section::Range;
-use serde::de::Error;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
 use super::error::{Checked, ScenarioError, ranges_of, require, require_each, require_range};
 use super::merge::{Given, over_kind};

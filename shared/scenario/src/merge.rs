@@ -1,13 +1,11 @@
 //! Replacement of values by tables: over a kind of the rig, over the file of a robot, and over a scenario. The values
 //! are not checked here.
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path};
 
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, Error};
-use toml::de::Error as TomlError;
-use toml::{Table, Value};
+use toml::{Table, Value, de::Error as TomlError};
 
 use super::error::ScenarioError;
 use crate::wording::listed;

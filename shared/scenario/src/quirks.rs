@@ -4,8 +4,7 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use masseter_model::geometry::AXIS_NAMES;
-use masseter_model::section::Range;
+use masseter_model::{geometry::AXIS_NAMES, section::Range};
 use serde::{Deserialize, Serialize};
 use serde_json::json;
 

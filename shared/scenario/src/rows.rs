@@ -5,8 +5,7 @@
 
 use std::io::{self, BufRead, Read};
 
-use crate::input::excerpt;
-use crate::wording::counted;
+use crate::{input::excerpt, wording::counted};
 
 /// Bytes of the longest line. Numbers of full precision need a tenth of this length.
 const LONGEST_LINE: usize = 4096;

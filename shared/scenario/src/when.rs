@@ -3,8 +3,7 @@
 //! Times count from switch-on, from the beginning of the motion, or from another occurrence. This module resolves
 //! names, and refuses times that count from each other. The runtime's `Injection` follows the occurrences of a run.
 
-use std::collections::BTreeMap;
-use std::iter::successors;
+use std::{collections::BTreeMap, iter::successors};
 
 use super::control::ControllerState;
 use super::error::{Checked, ScenarioError, require};

@@ -3,12 +3,10 @@
 //! While a brake opens, the motor holds the axis already; while a brake closes, the motor has no current. Without
 //! faults the mechanism gets the force of the loops.
 
-use super::demand::ServoCommand;
-use super::motion::Motion;
 use super::servo::{BRAKE_DAMPING_N_S_M, BRAKE_STIFFNESS_N_M, Servo, ServoLimits};
+use super::{demand::ServoCommand, motion::Motion};
 use crate::faults::{DriveFault, DriveFaults};
-use crate::quirks::AxisQuirks;
-use crate::ratings::Ratings;
+use crate::{quirks::AxisQuirks, ratings::Ratings};
 
 /// Share of the rated force at which a motor counts as pushing against a stop.
 const STOP_SHARE: f64 = 0.2;

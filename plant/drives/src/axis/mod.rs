@@ -17,12 +17,8 @@ mod servo;
 use masseter_can::canopen::EmergencyCode;
 use masseter_can::cia402::{Controlword, DriveState, StateCommand, StatusBit, Statusword};
 
-use crate::dictionary::Objects;
 use crate::faults::{DriveFault, DriveFaults};
-use crate::names;
-use crate::quirks::AxisQuirks;
-use crate::ratings::Ratings;
-use crate::settings::DriveSettings;
+use crate::{dictionary::Objects, names, quirks::AxisQuirks, ratings::Ratings, settings::DriveSettings};
 use demand::{Demand, Ramp, ServoCommand};
 use drivetrain::Drivetrain;
 use encoder::{Coordinates, Look, Switches};

@@ -1,7 +1,6 @@
 //! Motion of an axis: the values that its parts exchange. What is demanded over time is in [`demand`](super::demand).
 
-use crate::dictionary::Objects;
-use crate::names;
+use crate::{dictionary::Objects, names};
 
 /// Position and velocity of an axis at an instant.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -3,8 +3,7 @@
 //!
 //! The closed form holds at every instant, so that no error accumulates. Jerk is not limited.
 
-use super::motion::Motion;
-use super::parameters::MotionLimits;
+use super::{motion::Motion, parameters::MotionLimits};
 
 /// A stretch of constant acceleration.
 #[derive(Debug, Clone, Copy, Default, PartialEq, serde::Serialize, serde::Deserialize)]

@@ -4,17 +4,15 @@
 //! raises no emergency and answers no remote requests. A change of a parameter compiles the PDOs into copies of bytes;
 //! the rules of [access](super::access) decide the allowed changes.
 
-use std::cmp::Ordering;
-use std::collections::VecDeque;
+use std::{cmp::Ordering, collections::VecDeque};
 
 use arrayvec::ArrayVec;
 use masseter_can::canopen::{CobId, EmergencyCode};
 use masseter_can::{CanId, Frame};
 
-use crate::MILLISECOND_NS;
-use crate::axis::motion::NewTargets;
 use crate::dictionary::{ENTRIES, Objects};
 use crate::table::{MAPPED_MAX, PDOS};
+use crate::{MILLISECOND_NS, axis::motion::NewTargets};
 
 /// The PDOs of both directions.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]

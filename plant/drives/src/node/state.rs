@@ -6,11 +6,9 @@
 use arrayvec::ArrayVec;
 use masseter_can::canopen::{Emergency, EmergencyCode, NmtState, NodeId};
 
-use crate::MILLISECOND_NS;
-use crate::dictionary::Objects;
-use crate::names;
 use crate::names::{ERROR_CODE, ERROR_COUNT, ERROR_REGISTER, NEWEST_ERROR};
 use crate::table::{CONSUMED, HISTORY};
+use crate::{MILLISECOND_NS, dictionary::Objects, names};
 
 /// From power-on to the boot-up message, ns.
 pub(super) const BOOT_NS: u64 = 20 * MILLISECOND_NS;

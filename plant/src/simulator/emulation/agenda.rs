@@ -3,8 +3,7 @@
 //! The agenda acts on nothing. It hands out each change once, derives the present effects from the active entries, and
 //! keeps the emulation's reports on each entry.
 
-use std::collections::VecDeque;
-use std::ops::Range;
+use std::{collections::VecDeque, ops::Range};
 
 use masseter_model::geometry::AXES;
 use masseter_runtime::injection::{Injected, Injection};
@@ -13,8 +12,7 @@ use masseter_scenario::{
 };
 use nalgebra::Vector6;
 
-use super::jaw;
-use super::push::Push;
+use super::{jaw, push::Push};
 use crate::error::PlantError;
 use crate::master::link::Occurrence;
 use crate::simulator::mechanism::axes::AxisFaults;

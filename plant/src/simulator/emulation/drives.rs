@@ -5,9 +5,8 @@
 #[cfg(test)]
 mod tests;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::{fs, io};
+use std::{collections::BTreeMap, fs, io};
 
 use masseter_can::canopen::{NodeId, ObjectAddress};
 use masseter_drives::{DriveMemory, DriveSettings, Identity, Quirk, Ratings, SettingsError};
@@ -19,9 +18,8 @@ use masseter_scenario::{
     QuirkKindConfig as Kind, Scenario,
 };
 
-use crate::error::PlantError;
 use crate::master::link::{check_quantities, node_ids};
-use crate::state::state;
+use crate::{error::PlantError, state::state};
 
 /// The settings of a scenario's drives, in the order of the axes.
 ///

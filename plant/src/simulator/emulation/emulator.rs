@@ -11,8 +11,7 @@ use masseter_scenario::Scenario;
 
 use super::Emulation;
 use crate::error::{DynamicsError, PlantError};
-use crate::master::link::drive_ports;
-use crate::master::sockets::refuse_unfit;
+use crate::{master::link::drive_ports, master::sockets::refuse_unfit};
 
 /// The longest wait for a frame: the drives are stepped at least this often, ns.
 const LONGEST_WAIT_NS: u64 = MILLISECOND_NS;

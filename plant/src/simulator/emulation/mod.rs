@@ -19,8 +19,7 @@ pub(crate) mod virtual_link;
 
 use std::ops::Range;
 
-use masseter_can::canopen::Cob;
-use masseter_can::{CanId, ErrorState, Frame};
+use masseter_can::{CanId, ErrorState, Frame, canopen::Cob};
 use masseter_drives::{DriveFault, DriveNode, DriveSettings, HeldMean};
 use masseter_model::dynamics::Energy;
 use masseter_model::geometry::{AXES, Mechanism};
@@ -29,10 +28,9 @@ use masseter_scenario::{self as scenario, AxisFault, FaultKindConfig, Scenario};
 use nalgebra::Translation3;
 
 use crate::error::{DynamicsError, PlantError};
-use crate::master::link::Mishap;
 use crate::simulator::mechanism::contact::food::{Food, FoodBreak};
 use crate::simulator::mechanism::dynamics::{Dynamics, MechanismState, closed_mouth, level};
-use crate::state::state;
+use crate::{master::link::Mishap, state::state};
 use agenda::{Agenda, Effect};
 use drives::{MemoryFile, drive_settings};
 use encoder::Encoder;

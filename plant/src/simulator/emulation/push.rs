@@ -2,13 +2,11 @@
 //!
 //! Comments in the file begin with `#`, and blank lines are ignored. Between two rows the values change evenly.
 
-use std::ops::Range;
-use std::path::Path;
+use std::{ops::Range, path::Path};
 
 use masseter_runtime::clock::SECOND_NS;
-use masseter_scenario::input::read_text;
 use masseter_scenario::rows::{fields, lines, numbers};
-use masseter_scenario::{Shape, StimulusConfig};
+use masseter_scenario::{Shape, StimulusConfig, input::read_text};
 use nalgebra::Vector6;
 
 use crate::error::PlantError;

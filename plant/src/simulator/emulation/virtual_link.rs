@@ -5,9 +5,8 @@ use std::ops::Range;
 use masseter_can::faults::{FaultNote, Faults};
 use masseter_can::{Bus, ReceiveError, Tapped, VirtualWire, WireConfig};
 use masseter_model::geometry::AXES;
-use masseter_runtime::injection::Injected;
 use masseter_runtime::messages::{Contact, Truth};
-use masseter_runtime::realtime::Waiter;
+use masseter_runtime::{injection::Injected, realtime::Waiter};
 use masseter_scenario::{MASTER_NODE, Scenario};
 
 use super::Emulation;

@@ -5,8 +5,7 @@ use std::ffi::{c_int, c_void};
 use masseter_controller::pose_law::{FunctionLaw, LawFailed, PoseLaw, asked_pose};
 use masseter_controller::robot_model::{RobotModel, RobotModelError};
 use masseter_model::geometry::{AXES, Pose};
-use masseter_runtime::messages::pose_fields;
-use masseter_runtime::named::Declared;
+use masseter_runtime::{messages::pose_fields, named::Declared};
 
 /// A pose: position in the base frame, m, and unit quaternion.
 #[repr(C)]

@@ -8,14 +8,11 @@
 mod law;
 mod robot;
 
-use std::borrow::Cow;
-use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::time::Duration;
+use std::{borrow::Cow, cell::RefCell, time::Duration};
 
-use masseter_controller::process;
-use masseter_controller::robot_model::RobotModel;
+use masseter_controller::{process, robot_model::RobotModel};
 use masseter_runtime::control::{Outcome, Session, Tick, Waited};
 use masseter_runtime::lifecycle::ProcessContext;
 use masseter_runtime::lifecycle::attach::attach;

@@ -6,8 +6,7 @@ use std::ffi::{CString, c_char, c_int};
 use masseter_controller::robot_model::{JacobianRows, MotionPoint, RobotModel, RobotModelError, Times};
 use masseter_model::geometry::{AXES, Pose};
 
-use crate::law::MasseterPose;
-use crate::{Failure, MasseterSession, NULL, OK, guarded};
+use crate::{Failure, MasseterSession, NULL, OK, guarded, law::MasseterPose};
 
 /// A [`MotionPoint`].
 #[repr(C)]

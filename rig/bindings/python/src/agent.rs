@@ -1,7 +1,6 @@
 //! The rig's controller, whose targets, pose or forces come from outside while it moves the jaw.
 
-use std::cell::Cell;
-use std::rc::Rc;
+use std::{cell::Cell, rc::Rc};
 
 use anyhow::{Context, bail, ensure};
 use masseter_controller::motion_controller::MotionController;
@@ -9,9 +8,8 @@ use masseter_controller::pose_law::{Demand, LawFailed, PoseLaw, asked_pose};
 use masseter_model::geometry::{AXES, Pose};
 use masseter_plan::RunPlan;
 use masseter_runtime::control::{Controller, NoBranch, Outcome, Tick};
-use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::messages::{Command, Event, Reading, State};
-use masseter_runtime::named::Declared;
+use masseter_runtime::{messages::codes::ControllerState, named::Declared};
 use masseter_scenario::Scenario;
 
 /// The least length of numbers that give a quaternion.

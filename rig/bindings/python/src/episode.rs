@@ -3,11 +3,9 @@
 use std::path::PathBuf;
 
 use anyhow::{bail, ensure};
-use masseter_judge::requirements::check_requirements;
-use masseter_judge::{EventRecord, Watch};
+use masseter_judge::{EventRecord, Watch, requirements::check_requirements};
 use masseter_plan::{Overrides, RunPlan, scenario_with_overrides};
-use masseter_runtime::control::Controller;
-use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::{control::Controller, messages::codes::ControllerState};
 use masseter_virtual_time::{Run, RunSnapshot};
 
 use crate::agent::{ActionKind, Agent, Exchange, Exchanged};

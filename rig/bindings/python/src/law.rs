@@ -1,18 +1,14 @@
 //! A pose law that is a function of Python.
 
-use std::sync::mpsc;
-use std::thread;
-use std::time::Duration;
+use std::{sync::mpsc, thread, time::Duration};
 
 use masseter_controller::pose_law::{
     Demand as RigDemand, ExternalForce as RigExternalForce, FunctionLaw, LawFailed, asked_pose,
 };
 use masseter_controller::process::run_with_law;
 use masseter_model::geometry::{self, AXES};
-use masseter_runtime::control::Outcome;
-use masseter_runtime::lifecycle::attach::attach;
-use masseter_runtime::messages::pose_fields;
 use masseter_runtime::named::{Declared, Parameter, PlayedMotion, Signal};
+use masseter_runtime::{control::Outcome, lifecycle::attach::attach, messages::pose_fields};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyMappingProxy};
 

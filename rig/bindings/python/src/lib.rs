@@ -21,10 +21,8 @@ use masseter_recording::{ReadError, Reader, RunFolder, Topic};
 use masseter_runtime::lifecycle::attach::AttachError;
 use masseter_runtime::messages::{pose_fields, pose_from_fields};
 use masseter_scenario::Scenario;
-use pyo3::create_exception;
-use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
-use pyo3::types::PyBytes;
+use pyo3::{create_exception, exceptions::PyException, types::PyBytes};
 
 create_exception!(masseter, MasseterError, PyException, "The message of the rig, with what to do.");
 create_exception!(masseter, NoRigError, MasseterError, "No rig of that name takes a controller.");

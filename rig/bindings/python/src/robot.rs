@@ -7,8 +7,7 @@ use masseter_model::geometry::{self, AXES};
 use masseter_scenario::Scenario;
 use pyo3::prelude::*;
 
-use crate::failed;
-use crate::law::Pose;
+use crate::{failed, law::Pose};
 
 /// Six numbers: of the axes d1 d2 d3 l1 l2 l3, or of a twist or wrench.
 type Six = [f64; AXES];

@@ -1,7 +1,6 @@
 //! A controller of the drives in Python: its part in a run, cycle by cycle. Messages cross as the bytes of their structures.
 
-use std::cell::RefCell;
-use std::time::Duration;
+use std::{cell::RefCell, time::Duration};
 
 use masseter_runtime::control::{self, Outcome, Tick, Waited};
 use masseter_runtime::lifecycle::ProcessContext;
@@ -13,8 +12,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
 use crate::law::{ParameterOfPython, SignalOfPython, declared};
-use crate::robot::RobotModel;
-use crate::{failed, not_attached};
+use crate::{failed, not_attached, robot::RobotModel};
 
 /// A part in a run. It belongs to the thread that made it.
 #[pyclass(unsendable)]

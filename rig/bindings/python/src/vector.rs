@@ -1,20 +1,17 @@
 //! Environments side by side, on threads that run without the interpreter. A run stays on its thread, and orders pass by channels.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
-use std::thread;
-use std::time::Duration;
+use std::{sync::Arc, thread, time::Duration};
 
 use anyhow::bail;
 use bytemuck::cast_slice;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
-use crate::agent::Exchange;
 use crate::env::{Arguments, raised};
 use crate::episode::{self, Episode, Over, Settings};
-use crate::{failed, floats};
+use crate::{agent::Exchange, failed, floats};
 
 /// Time between two looks at Ctrl-C.
 const POLL: Duration = Duration::from_millis(20);

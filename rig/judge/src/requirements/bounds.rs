@@ -2,19 +2,14 @@
 
 use std::fmt::Display;
 
-use masseter_scenario::input::excerpt;
-use masseter_scenario::{Quantity, RequirementConfig, Statistic, Unit};
+use masseter_scenario::{Quantity, RequirementConfig, Statistic, Unit, input::excerpt};
 
 use super::condition::{Lookup, Moment};
-use super::dimension::BaseExponents;
-use super::expression::Expression;
 use super::finding::{Finding, OfKey, Reason, Refused, RequirementPlot};
-use super::missing::Missing;
-use super::trigger::Window;
+use super::{dimension::BaseExponents, expression::Expression, missing::Missing, trigger::Window};
 use crate::breach::{Breach, widen};
 use crate::series::{Extremes, Series};
-use crate::signals::Values;
-use crate::statistic::Sums;
+use crate::{signals::Values, statistic::Sums};
 
 /// A signal or an expression.
 #[derive(Debug, Clone)]

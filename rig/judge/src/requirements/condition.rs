@@ -1,8 +1,7 @@
 //! Conditions on a signal: `bite.force > 5 N`, `controller.state == safe_stop`, or a state of the controller alone.
 
 use masseter_runtime::messages::codes::ControllerState;
-use masseter_scenario::input::excerpt;
-use masseter_scenario::{Dimension, Quantity, QuantityError, Scenario, Unit};
+use masseter_scenario::{Dimension, Quantity, QuantityError, Scenario, Unit, input::excerpt};
 
 use super::finding::{Finding, Reason};
 use super::missing::Phase;

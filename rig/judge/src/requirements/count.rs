@@ -1,7 +1,6 @@
 //! What must never happen, how often something occurs, and in which order.
 
-use masseter_scenario::wording::counted;
-use masseter_scenario::{Dimension, RequirementConfig};
+use masseter_scenario::{Dimension, RequirementConfig, wording::counted};
 
 use super::condition::{Condition, Lookup, Moment, is_condition};
 use super::finding::{Finding, OfKey, Refused};

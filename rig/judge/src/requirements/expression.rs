@@ -6,8 +6,7 @@
 use std::convert::Infallible;
 use std::f64::consts::{E, PI, TAU};
 
-use masseter_scenario::Dimension;
-use masseter_scenario::input::excerpt;
+use masseter_scenario::{Dimension, input::excerpt};
 
 use super::dimension::{BaseExponents, Misfit, Term};
 

@@ -4,10 +4,8 @@ use masseter_scenario::Unit;
 use serde::Serialize;
 
 use super::missing::Missing;
-use crate::breach::Breach;
 use crate::check::{CheckFigures, CheckResult};
-use crate::series::Curve;
-use crate::signals::UnknownSignal;
+use crate::{breach::Breach, series::Curve, signals::UnknownSignal};
 
 /// The judgement of a requirement, in SI units.
 #[derive(Debug, Clone, PartialEq)]

@@ -15,19 +15,15 @@ mod trigger;
 
 use std::collections::BTreeSet;
 
-use masseter_runtime::messages::codes::ControllerState;
-use masseter_runtime::named::Declared;
-use masseter_scenario::input::excerpt;
-use masseter_scenario::wording::nearest;
-use masseter_scenario::{Dimension, RequirementConfig, Scenario, Statistic};
+use masseter_runtime::{messages::codes::ControllerState, named::Declared};
+use masseter_scenario::{
+    Dimension, RequirementConfig, Scenario, Statistic, input::excerpt, wording::nearest,
+};
 
-use self::bounds::Bounds;
 use self::condition::{Lookup, Moment};
 use self::count::{Count, Never, Order};
 use self::finding::{Finding, Reason, Refused};
-use self::missing::Phase;
-use self::response::Response;
-use self::trigger::Trigger;
+use self::{bounds::Bounds, missing::Phase, response::Response, trigger::Trigger};
 use crate::check::CheckFigures;
 use crate::signals::{Registry, Sample, Values};
 

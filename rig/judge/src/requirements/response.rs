@@ -8,8 +8,7 @@
 use std::collections::VecDeque;
 
 use masseter_runtime::clock::SECOND_NS;
-use masseter_scenario::wording::counted;
-use masseter_scenario::{Dimension, Quantity, RequirementConfig, Unit};
+use masseter_scenario::{Dimension, Quantity, RequirementConfig, Unit, wording::counted};
 
 use super::condition::{Condition, Lookup, Moment};
 use super::finding::{Finding, OfKey, Refused};

@@ -6,9 +6,7 @@ use std::collections::BTreeSet;
 
 use masseter_runtime::clock::SECOND_NS;
 use masseter_runtime::messages::codes::{Cause, ControllerState, Source};
-use masseter_scenario::input::excerpt;
-use masseter_scenario::wording::nearest;
-use masseter_scenario::{During, RequirementConfig, Scenario, TimeWindow};
+use masseter_scenario::{During, RequirementConfig, Scenario, TimeWindow, input::excerpt, wording::nearest};
 
 use super::condition::{Condition, Lookup, Moment, has_comparison, state_of_controller};
 use super::finding::{Finding, OfKey, Reason, Refused};

@@ -11,9 +11,8 @@ use masseter_scenario::{MotionConfig, Scenario, Unit};
 
 use super::signal::{Jaw, JawPoint, NamedSignal, SignalList, estimated};
 use super::timeline::CycleMessages;
-use crate::condyles::Condyles;
-use crate::poses::true_pose;
 use crate::pressure::{PressedTooth, Pressure};
+use crate::{condyles::Condyles, poses::true_pose};
 
 /// A measure of what presses on a tooth.
 type Measure = fn(&Pressure) -> f64;

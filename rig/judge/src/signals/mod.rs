@@ -11,12 +11,9 @@ use std::sync::Arc;
 
 use masseter_model::geometry::Pose;
 use masseter_runtime::named::Declared;
-use masseter_scenario::Scenario;
-use masseter_scenario::input::excerpt;
-use masseter_scenario::wording::nearest;
+use masseter_scenario::{Scenario, input::excerpt, wording::nearest};
 
-use self::catalogue::signals;
-use self::signal::Jaw;
+use self::{catalogue::signals, signal::Jaw};
 use crate::poses::is_running;
 
 pub use signal::NamedSignal;

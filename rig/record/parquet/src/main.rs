@@ -1,11 +1,8 @@
 //! The program `masseter-parquet`: takes the rows of a table from standard input, and writes a Parquet file to standard
 //! output. `masseter` starts it; it is a program of its own, since the crate `parquet` would lengthen every first build.
 
-use std::fs::File;
 use std::io::{self, ErrorKind, IsTerminal};
-use std::os::fd::AsFd;
-use std::process::ExitCode;
-use std::sync::Arc;
+use std::{fs::File, os::fd::AsFd, process::ExitCode, sync::Arc};
 
 use anyhow::{anyhow, bail};
 use masseter_table::{Column, Rows, Values};

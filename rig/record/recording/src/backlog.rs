@@ -7,12 +7,11 @@
 #[cfg(test)]
 mod tests;
 
-use std::mem;
 use std::sync::mpsc::{
     Receiver, RecvTimeoutError, SyncSender, TryRecvError, TrySendError, channel, sync_channel,
 };
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::{mem, time::Duration};
 
 use masseter_runtime::clock::{self, SECOND_NS};
 use masseter_scenario::wording::counted;

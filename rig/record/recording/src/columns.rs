@@ -4,15 +4,13 @@
 //! A definition may hold numbers, arrays of fixed length, and one byte sequence at its end. Other definitions, and those
 //! of messages longer than any of the rig's, are refused.
 
-use std::collections::BTreeMap;
-use std::fmt;
+use std::{collections::BTreeMap, fmt};
 
 use masseter_runtime::messages::{FrameTap, Message};
 use masseter_scenario::wording::shortest;
 use mcap::Channel;
 
-use crate::encoding::FrameBatch;
-use crate::topic::Topic;
+use crate::{encoding::FrameBatch, topic::Topic};
 
 /// A primitive type of the definition language.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

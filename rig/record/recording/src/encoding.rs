@@ -5,9 +5,7 @@
 //! its place among the messages of the other topics. Times are those since the frame before: they repeat from cycle to cycle
 //! also where the cycle's begin varies.
 
-use std::array;
-use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::{array, collections::BTreeMap, sync::Arc};
 
 use cdr::{CdrLe, Infinite};
 use masseter_runtime::messages::{CanData, FrameTap};

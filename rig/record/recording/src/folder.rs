@@ -3,9 +3,8 @@
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Write};
-use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
-use std::time::UNIX_EPOCH;
+use std::{os::unix::fs::symlink, time::UNIX_EPOCH};
 
 use masseter_runtime::clock;
 

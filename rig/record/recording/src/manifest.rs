@@ -1,14 +1,10 @@
 //! `manifest.json`: scenario, machine, scheduling and end of a run; the processes' use of the machine and the setting for
 //! wake-ups. The verdict on the run is the judge's.
 
-use std::collections::BTreeMap;
-use std::io;
-use std::time::UNIX_EPOCH;
+use std::{collections::BTreeMap, io, time::UNIX_EPOCH};
 
 use masseter_model::geometry::AXES;
-use masseter_runtime::clock;
-use masseter_runtime::named::Declared;
-use masseter_runtime::realtime::scheduling::Obtained;
+use masseter_runtime::{clock, named::Declared, realtime::scheduling::Obtained};
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use masseter_scenario::{CpuDmaLatency, Scenario};
 use serde::{Deserialize, Serialize};

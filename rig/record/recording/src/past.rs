@@ -3,17 +3,15 @@
 //!
 //! This finds accidents: an edited file, or a recording of another run. Nobody is kept from forging every file.
 
-use std::io;
-use std::path::PathBuf;
+use std::{io, path::PathBuf};
 
 use masseter_scenario::Scenario;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_bytes};
 use mcap::Attachment;
 use serde_json::{Map, Value};
 
-use crate::folder::RunFolder;
 use crate::manifest::{AT_START, Manifest};
-use crate::reader::Reader;
+use crate::{folder::RunFolder, reader::Reader};
 
 /// Known at the start and of no weight for the verdict.
 const BUILD: &str = "masseter";

@@ -1,13 +1,8 @@
 //! Reads a recording from its beginning, also one that was cut short or damaged: every whole chunk is
 //! read, and every stretch that cannot be read is reported with its place.
 
-use std::borrow::Cow;
-use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::{self, BufReader, Read, Seek};
-use std::path::Path;
-use std::sync::Arc;
-use std::vec;
+use std::{borrow::Cow, collections::BTreeMap, fs::File, path::Path, sync::Arc, vec};
 
 use masseter_runtime::messages::LAYOUT_VERSION;
 use masseter_scenario::input::open_regular;

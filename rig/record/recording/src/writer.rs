@@ -4,26 +4,19 @@
 //! It waits for its medium; a process that must not wait records through a
 //! [`Backlog`](super::Backlog).
 
-use std::borrow::Cow;
-use std::error::Error;
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Cursor, Seek, Write};
-use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
-use std::thread;
+use std::{borrow::Cow, error::Error, path::Path, thread};
 
-use masseter_runtime::messages::FrameTap;
-use masseter_runtime::named::Declared;
+use masseter_runtime::{messages::FrameTap, named::Declared};
 use masseter_scenario::input::read_bytes;
-use mcap::records::MessageHeader;
-use mcap::write::NoSeek;
-use mcap::{Attachment, Compression, McapError, WriteOptions, Writer};
+use mcap::{Attachment, Compression, McapError, WriteOptions, Writer, records::MessageHeader, write::NoSeek};
 
 use crate::encoding::{Channel, Encoded, Encoder, FrameBatch, definition};
-use crate::folder::RunFolder;
 use crate::manifest::{AT_START, Manifest};
-use crate::scene::Scene;
 use crate::topic::{Recorded, Topic};
+use crate::{folder::RunFolder, scene::Scene};
 
 /// Bytes of messages in a chunk, the unit of compression and of a tool that seeks. Twice as many save 0.4 %.
 const CHUNK_BYTES: u64 = 1 << 20;

@@ -1,13 +1,10 @@
 //! Writes a table part by part, so that its length does not matter for the memory: as CSV, or by the program that writes
 //! Parquet. That is one of its own, since the crates that it needs would lengthen every first build.
 
-use std::env;
-use std::fs::File;
 use std::io::{self, BufWriter, ErrorKind, Read, Write};
-use std::os::unix::process::CommandExt;
-use std::path::PathBuf;
 use std::process::{Child, ChildStdin, Command, ExitStatus, Stdio};
 use std::thread::{self, JoinHandle};
+use std::{env, fs::File, os::unix::process::CommandExt, path::PathBuf};
 
 use crate::rows::{send_columns, send_end, send_part};
 use crate::table::Table;

@@ -4,9 +4,8 @@
 //! Everything comes from the recording alone: a run folder is not needed. The recording is read twice, first for its gaps and
 //! the start of its motion. Rows are written in groups, so that its length does not matter for the memory.
 
-use std::collections::BTreeMap;
-use std::fs;
 use std::path::{Path, PathBuf};
+use std::{collections::BTreeMap, fs};
 
 use anyhow::{Context, anyhow, bail};
 use clap::{Args, ValueEnum};
@@ -15,15 +14,13 @@ use masseter_recording::{Columns, Description, Field, Reader, Recorded, Topic, n
 use masseter_report::{CandumpLogs, jaw_cycle_table};
 use masseter_runtime::messages::tap;
 use masseter_runtime::named::{Declared, Parameter, Signal};
-use masseter_scenario::Scenario;
-use masseter_scenario::wording::nearest;
+use masseter_scenario::{Scenario, wording::nearest};
 use masseter_table::{Cell, Format, ParquetProgram, Table, TableWriter, write_table};
 use masseter_terminal::{Exit, result};
 use mcap::Channel;
 
-use crate::survey::Survey;
 use crate::tables::{CYCLES, CycleTable, TopicTable};
-use crate::verbs::RecordingArgs;
+use crate::{survey::Survey, verbs::RecordingArgs};
 
 /// The name of the table of jaw cycles.
 const JAW_CYCLES: &str = "jaw_cycles";

@@ -1,8 +1,7 @@
 //! One pass over a recording: its contents, its gaps, and its damage.
 
-use std::collections::BTreeMap;
 use std::fmt::{Error, Write};
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path};
 
 use anyhow::Context;
 use masseter_judge::{SequenceCheck, TopicFigures};

@@ -3,8 +3,7 @@
 //! The supervisor derives the manifest's usage figures from the samples, the recorder the topic `machine`. Reading costs
 //! the processes nothing. This module computes no differences.
 
-use std::cmp::Reverse;
-use std::collections::BTreeMap;
+use std::{cmp::Reverse, collections::BTreeMap};
 
 use crate::SystemRoot;
 

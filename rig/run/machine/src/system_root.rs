@@ -1,8 +1,7 @@
 //! Files of `/proc` and `/sys`, below a root that tests can replace.
 
-use std::fs;
-use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
+use std::{fs, ops::RangeInclusive};
 
 /// The folder below which `proc` and `sys` lie.
 #[derive(Debug, Clone, PartialEq, Eq)]

@@ -20,8 +20,7 @@ use std::time::Duration;
 
 use anyhow::{Context, ensure};
 use masseter_controller::trajectory::{self, Trajectory, TrajectoryError, TrajectoryReport};
-use masseter_model::dynamics::Friction;
-use masseter_model::geometry::Mechanism;
+use masseter_model::{dynamics::Friction, geometry::Mechanism};
 use masseter_plant::core as plant;
 use masseter_runtime::schedule::CycleSchedule;
 use masseter_scenario::{DriveProfile, FileConfig, MotionConfig, Scenario};

@@ -10,10 +10,7 @@
 pub mod live;
 mod sinks;
 
-use std::collections::VecDeque;
-use std::net::SocketAddr;
-use std::path::PathBuf;
-use std::time::Duration;
+use std::{collections::VecDeque, net::SocketAddr, path::PathBuf, time::Duration};
 
 use anyhow::Context;
 use clap::Args;
@@ -21,16 +18,13 @@ use masseter_machine::SystemRoot;
 use masseter_machine::counters::{Sample, Sampler};
 use masseter_model::geometry::Mechanism;
 use masseter_recording::{Backlog, Manifest, Pace, Recorded, Recorder, RunFolder, Scene};
-use masseter_runtime::clock;
 use masseter_runtime::lifecycle::{ProcessArguments, Start, StopRequest};
-use masseter_runtime::lockstep::RecorderSignals;
 use masseter_runtime::messages::{
     Command, Contact, Event, FrameTap, LAYOUT_VERSION, Machine, Message, Parameters, Reading, Signals, State,
     Truth,
 };
-use masseter_runtime::named::Declared;
-use masseter_runtime::realtime::scheduling::keep_off;
 use masseter_runtime::transport::{Domain, FrameSubscriber, Node, Topic, TransportError};
+use masseter_runtime::{clock, lockstep::RecorderSignals, named::Declared, realtime::scheduling::keep_off};
 use masseter_terminal::{Exit, StderrWriter};
 
 use live::{LiveServer, listen_on};

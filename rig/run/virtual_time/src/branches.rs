@@ -7,9 +7,8 @@ use masseter_judge::{Analysis, Figures};
 use masseter_plan::RunPlan;
 use masseter_plant::PlantError;
 use masseter_recording::Manifest;
-use masseter_runtime::control::NoBranch;
-use masseter_runtime::messages::tap::TapError;
 use masseter_runtime::named::{Declared, NameError};
+use masseter_runtime::{control::NoBranch, messages::tap::TapError};
 
 use crate::log::Stream;
 use crate::run::{Control, Requests, RestoreError, Run, RunSnapshot, Without, built};

@@ -3,18 +3,14 @@
 //!
 //! [`LoggedPorts`] are the ports of a controller in this thread. Nothing here steps the plant.
 
-use std::cell::Cell;
-use std::convert::Infallible;
+use std::{cell::Cell, convert::Infallible};
 
-use masseter_judge::signals::CycleMessages;
-use masseter_judge::{Analysis, Figures, Watch};
+use masseter_judge::{Analysis, Figures, Watch, signals::CycleMessages};
 use masseter_plant::core::PlantCore;
 use masseter_plant::state::{Archive, State};
 use masseter_recording::{Backlog, Recorded};
-use masseter_runtime::control::ControllerPorts;
-use masseter_runtime::messages::tap::TapError;
 use masseter_runtime::messages::{self, Command, Event, Message, Parameters, Reading, Signals};
-use masseter_runtime::realtime::Wake;
+use masseter_runtime::{control::ControllerPorts, messages::tap::TapError, realtime::Wake};
 
 /// Takes every message of a run.
 pub trait Sink {

@@ -9,9 +9,7 @@
 #[cfg(test)]
 mod tests;
 
-use std::error::Error;
-use std::path::Path;
-use std::sync::Arc;
+use std::{error::Error, path::Path, sync::Arc};
 
 use masseter_judge::signals::{Registry, UnknownSignal};
 use masseter_plan::RunPlan;
@@ -20,9 +18,8 @@ use masseter_runtime::messages::{Command, Event, Reading, Truth};
 use masseter_runtime::named::Declared;
 use masseter_scenario::Scenario;
 
-use crate::log::Latest;
 use crate::snapshot::{OtherScenario, Snapshot, SnapshotError};
-use crate::stepper::Stepper;
+use crate::{log::Latest, stepper::Stepper};
 
 /// Why a rig cannot be made, stepped or restored.
 #[derive(Debug, thiserror::Error)]

@@ -11,15 +11,12 @@ use masseter_plant::PlantError;
 use masseter_recording::Ending;
 use masseter_runtime::control::{Controller, Deadline, Duties, NoBranch, Observed, Outcome, set_parameters};
 use masseter_runtime::injection::{Operator, Withdrawn};
-use masseter_runtime::lifecycle::Party;
-use masseter_runtime::lockstep::EPOCH_NS;
-use masseter_runtime::messages::Command;
 use masseter_runtime::named::{Declared, NameError, NamedValues};
+use masseter_runtime::{lifecycle::Party, lockstep::EPOCH_NS, messages::Command};
 use masseter_scenario::Scenario;
 
-use crate::log::Sink;
-use crate::snapshot::OtherScenario;
 use crate::stepper::{Stepper, StepperState};
+use crate::{log::Sink, snapshot::OtherScenario};
 
 /// What the user asks of a run; nothing where a method is not written.
 pub trait Requests {

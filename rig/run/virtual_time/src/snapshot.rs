@@ -7,20 +7,15 @@
 #[cfg(test)]
 mod tests;
 
-use std::fs::Permissions;
 use std::io::{self, Write};
-use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::{fs::Permissions, os::unix::fs::PermissionsExt, sync::Arc};
 
 use masseter_plant::state::{Archive, State};
-use masseter_scenario::Scenario;
-use masseter_scenario::input::read_bytes;
-use serde::de::DeserializeOwned;
-use serde::{Deserialize, Serialize};
+use masseter_scenario::{Scenario, input::read_bytes};
+use serde::{Deserialize, Serialize, de::DeserializeOwned};
 
-use crate::log::Latest;
-use crate::stepper::StepperState;
+use crate::{log::Latest, stepper::StepperState};
 
 /// What a file begins with.
 const MAGIC: [u8; 8] = *b"MASSETER";

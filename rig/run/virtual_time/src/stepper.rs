@@ -1,16 +1,11 @@
 //! The plant of a scenario that steps from one half of a cycle to the next, in exact time; and its state between them.
 
-use masseter_plant::PlantError;
-use masseter_plant::core::PlantCore;
 use masseter_plant::cycle::{PlantPorts, begin_cycle, end_cycle, run_after_controller};
-use masseter_plant::emulation::VirtualLink;
 use masseter_plant::state::{Archive, State};
+use masseter_plant::{PlantError, core::PlantCore, emulation::VirtualLink};
 use masseter_runtime::control::{self, Controller, Duties, Observed};
-use masseter_runtime::injection::Withdrawn;
-use masseter_runtime::lockstep::EPOCH_NS;
 use masseter_runtime::messages::{Command, Contact, Reading, Truth};
-use masseter_runtime::realtime::Wake;
-use masseter_runtime::schedule::CycleSchedule;
+use masseter_runtime::{injection::Withdrawn, lockstep::EPOCH_NS, realtime::Wake, schedule::CycleSchedule};
 use masseter_scenario::Scenario;
 
 use crate::log::{Log, LoggedPorts, Published, Publisher, Sink};

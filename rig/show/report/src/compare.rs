@@ -6,8 +6,7 @@
 //! and counts is unknown, and nothing is claimed of them.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write;
-use std::path::Path;
+use std::{fmt::Write, path::Path};
 
 use anyhow::{Context, bail, ensure};
 use masseter_recording::RunFolder;
@@ -16,8 +15,7 @@ use masseter_terminal::{Exit, Format, result};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::run_report::SUMMARY_FORM;
-use crate::text::or_dash;
+use crate::{run_report::SUMMARY_FORM, text::or_dash};
 
 /// Version of the comparison's form.
 const FORM: u32 = 1;

@@ -14,8 +14,7 @@ use serde::Serialize;
 
 use crate::logs::{CandumpLogs, WriteError, write_events, write_histograms};
 use crate::table::{self, Detail};
-use crate::why::Why;
-use crate::{junit, page};
+use crate::{junit, page, why::Why};
 
 /// Why the recording of a run could not be analysed.
 #[derive(Debug, thiserror::Error)]

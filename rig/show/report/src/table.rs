@@ -1,7 +1,6 @@
 //! The report as text for a terminal.
 
-use std::fmt::Write;
-use std::path::Path;
+use std::{fmt::Write, path::Path};
 
 use masseter_judge::{
     AxisFigures, BiteEstimateFigures, BusResponse, EventRecord, Figures, IntervalFigures, PoseErrors,
@@ -10,8 +9,7 @@ use masseter_judge::{
 use masseter_model::geometry::AXIS_NAMES;
 use masseter_recording::{Manifest, RunUsage, Usage};
 use masseter_runtime::messages::codes::{Cause, EventKind};
-use masseter_scenario::MotionConfig;
-use masseter_scenario::wording::counted;
+use masseter_scenario::{MotionConfig, wording::counted};
 use masseter_terminal::{Exit, Tone};
 
 use crate::text::{self, decimals, or_dash, us};

@@ -3,11 +3,9 @@
 //! A stopped terminal or a paused reader blocks whoever writes. The recorder must not wait, since it would lose messages,
 //! nor the server of the simulated buses, whose drives go on.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::thread;
-use std::time::Duration;
+use std::{sync::Arc, thread, time::Duration};
 
 use crate::{control, escaped};
 

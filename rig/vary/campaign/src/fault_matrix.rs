@@ -1,8 +1,6 @@
 //! The matrix of faults: what each fault did to the jaw and who detected it, as a table, as a picture and in words.
 
-use std::collections::BTreeMap;
-use std::fs;
-use std::path::Path;
+use std::{collections::BTreeMap, fs, path::Path};
 
 use anyhow::Context;
 use askama::Template;

@@ -5,12 +5,10 @@ use std::fs::{self, File};
 use anyhow::Context;
 use masseter_table::{Column, Table, Values, write_table};
 
-use crate::campaign::Campaign;
 use crate::case::{COLUMNS, CaseCheck, CaseResult, check_names};
 use crate::factor::{Factor, Setting};
-use crate::folder::CampaignFolder;
-use crate::page;
 use crate::report::{PAGE, Report, WorstCase};
+use crate::{campaign::Campaign, folder::CampaignFolder, page};
 
 /// Writes page and table into the folder of the campaign.
 ///

@@ -1,7 +1,6 @@
 //! Which factors move the smallest margin most.
 
-use crate::case::CaseResult;
-use crate::report::Report;
+use crate::{case::CaseResult, report::Report};
 
 /// A factor is cut into so many parts, each with as many of its values.
 const PARTS: usize = 5;

@@ -1,14 +1,11 @@
 //! What a campaign came to: the share that passed, the worst cases, and the files in which both are kept.
 
-use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::{collections::BTreeMap, path::PathBuf};
 
 use masseter_scenario::wording::counted;
 use masseter_table::Format;
 
-use crate::campaign::Campaign;
-use crate::case::CaseResult;
-use crate::folder::CampaignFolder;
+use crate::{campaign::Campaign, case::CaseResult, folder::CampaignFolder};
 
 /// Quantile of the normal distribution for an interval of 95 %.
 const Z: f64 = 1.959_963_984_540_054;

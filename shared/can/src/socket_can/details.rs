@@ -1,9 +1,7 @@
 //! What the kernel knows of a CAN interface: settings, state and queue, asked over rtnetlink. This module judges nothing.
 
 use std::fmt::{self, Display, Formatter};
-use std::fs;
-use std::io;
-use std::path::Path;
+use std::{fs, io, path::Path};
 
 // `socketcan` reads some of these attributes with its feature `netlink`, at the price of a dozen crates.
 use libc::{

@@ -1,8 +1,6 @@
 //! The CAN interfaces of this machine, and the remedy for every refusal to open one. This module changes no interface.
 
-use std::fs;
-use std::io;
-use std::path::Path;
+use std::{fs, io, path::Path};
 
 use socketcan::{CanSocket, Socket};
 

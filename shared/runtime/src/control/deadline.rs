@@ -4,8 +4,7 @@
 
 use masseter_scenario::{MotionConfig, Scenario};
 
-use crate::messages::codes::ControllerState;
-use crate::named::Declared;
+use crate::{messages::codes::ControllerState, named::Declared};
 
 /// How long a controller may take, by its own waits and moves, the motion, and `controller.overdue_s` beyond.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -4,13 +4,11 @@
 use std::time::Duration;
 
 use super::ControllerPorts;
-use crate::clock;
 use crate::lifecycle::{Party, ProcessContext, ProcessError, Report, SupervisorLink};
 use crate::lockstep::{Clock, Lockstep};
 use crate::messages::{Command, Event, Parameters, Reading, Signals, State};
-use crate::named::Declared;
-use crate::realtime::Wake;
 use crate::transport::{Publisher, ReceivedMessage, Subscriber, TransportError};
+use crate::{clock, named::Declared, realtime::Wake};
 
 /// The controller's ports on iceoryx2 and the deadlines of its cycles.
 #[derive(Debug)]

@@ -9,12 +9,11 @@ use super::{
     Controller, ControllerPorts, Duties, Outcome, Tick, complete_state, publish_begin, publish_named,
     run_cycle, set_parameters,
 };
-use crate::injection::Operator;
 use crate::lifecycle::{End, ProcessContext, ProcessError};
 use crate::messages::codes::{Cause, EventKind, Source};
 use crate::messages::{Command, Event, Reading, State};
 use crate::named::{Declared, NamedValues, access};
-use crate::realtime::Wake;
+use crate::{injection::Operator, realtime::Wake};
 
 /// A started run, for its controller.
 ///

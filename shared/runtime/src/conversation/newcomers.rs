@@ -1,9 +1,6 @@
 //! The peers of a server without a whole request. Their number is bounded, and each has a small buffer.
 
-use std::collections::VecDeque;
-use std::io;
-use std::os::fd::OwnedFd;
-use std::time::Duration;
+use std::{collections::VecDeque, io, os::fd::OwnedFd, time::Duration};
 
 use rustix::net::{SocketFlags, accept_with, listen};
 

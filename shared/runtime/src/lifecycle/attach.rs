@@ -7,9 +7,7 @@
 //! [`Report`]: super::Report
 //! [`Order`]: super::Order
 
-use std::path::PathBuf;
-use std::time::Duration;
-use std::{env, iter};
+use std::{env, iter, path::PathBuf, time::Duration};
 
 use masseter_scenario::input::excerpt;
 use serde::{Deserialize, Serialize};

@@ -1,11 +1,10 @@
 //! The line from a process to its supervisor, and the supervisor's request to end.
 
 use std::io::{self, BufRead, BufReader, Write};
-use std::os::unix::net::UnixStream;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex};
-use std::thread;
+use std::{os::unix::net::UnixStream, thread};
 
 use rustix::io::Errno;
 use rustix::net::{SendFlags, send};

@@ -10,9 +10,7 @@ pub mod attach;
 mod link;
 mod report;
 
-use std::io;
-use std::path::PathBuf;
-use std::time::Duration;
+use std::{io, path::PathBuf, time::Duration};
 
 use masseter_scenario::{Scenario, ScenarioError};
 

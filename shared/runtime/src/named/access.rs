@@ -3,11 +3,7 @@
 //! The controller's process listens on a socket in the private folder of its domain, so only the same user's programs
 //! reach it. A request and its answer are a line of JSON each. A thread of its own serves the requests, never the loop.
 
-use std::os::unix::net::UnixListener;
-use std::path::PathBuf;
-use std::sync::Arc;
-use std::time::Duration;
-use std::{fs, io, thread};
+use std::{fs, io, os::unix::net::UnixListener, path::PathBuf, sync::Arc, thread, time::Duration};
 
 use masseter_scenario::input::sentence;
 use serde::{Deserialize, Serialize};

@@ -7,10 +7,8 @@
 pub mod access;
 mod declared;
 
-use std::array;
-use std::collections::BTreeMap;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::{array, collections::BTreeMap, sync::Arc};
 
 use crate::messages::codes::{Cause, EventKind, Source};
 use crate::messages::{Event, MOST_VALUES, Values};

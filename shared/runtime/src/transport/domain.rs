@@ -6,10 +6,8 @@
 
 use std::fs::{self, File, Metadata, TryLockError};
 use std::io::{self, Write};
-use std::ops::Deref;
-use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::{ops::Deref, os::unix::fs::MetadataExt, time::Duration};
 
 use rustix::fs::{major, minor};
 use rustix::io::{FdFlags, fcntl_setfd};

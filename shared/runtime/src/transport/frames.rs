@@ -3,8 +3,7 @@
 //! The messages of a sample share the cost of sending and receiving it. Each message keeps a number of its own.
 
 use iceoryx2::prelude::{AllocationStrategy, ipc};
-use iceoryx2::sample::Sample;
-use iceoryx2::service::port_factory::publish_subscribe::PortFactory;
+use iceoryx2::{sample::Sample, service::port_factory::publish_subscribe::PortFactory};
 
 use super::{Connecting, Inlet, Node, Outlet, TransportError, check_version, failed};
 use crate::messages::{FrameTap, Message};

@@ -26,12 +26,8 @@ mod frames;
 mod runtime;
 mod signals;
 
-use std::borrow::Borrow;
-use std::fmt::Debug;
-use std::ops::Deref;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::Duration;
+use std::{borrow::Borrow, fmt::Debug, ops::Deref, sync::Arc, time::Duration};
 
 use iceoryx2::config::Config;
 use iceoryx2::node::{Node as IceoryxNode, NodeBuilder};

@@ -4,16 +4,14 @@
 //! The folder is `masseter` below the session's `XDG_RUNTIME_DIR`, `/run/masseter` of root, or `/dev/shm/masseter-UID`.
 //! If another user has taken that name, the folder is `/dev/shm/masseter-UID-1`, or a later number.
 
-use std::env;
 use std::fs::{self, DirBuilder, File, Metadata, OpenOptions};
 use std::io::{self, ErrorKind, Read};
-use std::iter;
 use std::os::unix::fs::{DirBuilderExt, MetadataExt, OpenOptionsExt, PermissionsExt};
 use std::path::{Path, PathBuf};
+use std::{env, iter};
 
 use masseter_scenario::input::excerpt;
-use rustix::fs::Mode;
-use rustix::process::geteuid;
+use rustix::{fs::Mode, process::geteuid};
 
 const ONLY_OWNER: Mode = Mode::RWXU;
 /// Permissions of group and others.

@@ -1,11 +1,7 @@
 //! Signals that wake a sleeping process: datagrams of one byte in the domain's root folder. iceoryx2's events need
 //! longer paths than sockets allow.
 
-use std::io::ErrorKind;
-use std::os::unix::net::UnixDatagram;
-use std::path::PathBuf;
-use std::thread;
-use std::time::Duration;
+use std::{io::ErrorKind, os::unix::net::UnixDatagram, path::PathBuf, thread, time::Duration};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;

@@ -1,8 +1,7 @@
 //! Device configuration files (CiA 306) of a profile: what the rig takes from them, what it cannot take, and for which node
 //! and bit rate they are.
 
-use std::collections::BTreeMap;
-use std::path::Path;
+use std::{collections::BTreeMap, path::Path};
 
 use masseter_can::canopen::ObjectAddress;
 use masseter_can::canopen::dcf::{Dcf, Entry, Value};

@@ -6,20 +6,16 @@
 mod dcf;
 mod object;
 
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::LazyLock;
+use std::{collections::BTreeMap, sync::LazyLock};
 
-use masseter_can::canopen::ObjectAddress;
-use masseter_can::{PdoMapping, PdoMappingError};
+use masseter_can::{PdoMapping, PdoMappingError, canopen::ObjectAddress};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use serde::de::Error;
-use serde::{Deserialize, Deserializer, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, de::Error};
 
 use super::error::{Checked, ScenarioError, ranges_of, require, require_axes, require_each};
 use super::merge::Given;
-use crate::CanConfig;
-use crate::wording::listed;
+use crate::{CanConfig, wording::listed};
 
 pub use dcf::DcfRead;
 pub use object::{ObjectConfig, ObjectKey, ObjectRule};

@@ -3,8 +3,7 @@
 mod kinds;
 
 use std::fmt::{self, Display, Formatter};
-use std::iter;
-use std::ops::Range;
+use std::{iter, ops::Range};
 
 use masseter_model::geometry::AXIS_NAMES;
 use serde::{Deserialize, Serialize};

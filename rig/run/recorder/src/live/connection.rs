@@ -1,14 +1,10 @@
 //! What the protocols of clients share: the socket to a client, its queue, and what every client may see and do.
 
-use std::io::ErrorKind;
-use std::net::TcpStream;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::{io::ErrorKind, net::TcpStream, sync::Arc, time::Duration};
 
 use masseter_recording::{Recorded, Scene, Topic};
-use masseter_runtime::named::Declared;
-use masseter_runtime::transport::Domain;
+use masseter_runtime::{named::Declared, transport::Domain};
 use rustix::process::{Pid, Signal, getppid, kill_process};
 use serde::Serialize;
 use tungstenite::Error;

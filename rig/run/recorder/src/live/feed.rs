@@ -3,12 +3,10 @@
 //! A thread of its own takes the messages. It makes the page ten times a second while somebody watches, and keeps what has
 //! changed as an update. The recorder never waits for it: a message without room is left out of the page, and is counted.
 
-use std::collections::VecDeque;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::thread;
-use std::time::Duration;
+use std::{collections::VecDeque, thread, time::Duration};
 
 use masseter_judge::Analysis;
 use masseter_page::{Block, Chart, Content, Page, PageError, Section};

@@ -15,19 +15,17 @@ mod request;
 #[cfg(test)]
 mod tests;
 
-use std::io;
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicU16, AtomicU64, Ordering};
 use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::{self, JoinHandle};
-use std::time::Duration;
+use std::{io, time::Duration};
 
 use masseter_recording::{Manifest, Recorded, Scene};
-use masseter_runtime::clock;
 use masseter_runtime::conversation::{Conversation, Limits, Newcomers};
-use masseter_runtime::named::Declared;
 use masseter_runtime::transport::{Domain, secret};
+use masseter_runtime::{clock, named::Declared};
 use tungstenite::http::StatusCode;
 
 pub use report::ReportServer;

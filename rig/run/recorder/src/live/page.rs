@@ -6,15 +6,13 @@
 use std::sync::mpsc::{Receiver, TryRecvError};
 
 use masseter_runtime::clock::{self, SECOND_NS};
-use masseter_runtime::conversation::Conversation;
-use masseter_runtime::named::access;
+use masseter_runtime::{conversation::Conversation, named::access};
 use serde::Deserialize;
 use serde_json::json;
 use tungstenite::http::StatusCode;
 
 use super::connection::{Disconnected, Host, Queued, Socket};
-use super::feed::Next;
-use super::request::http_answer;
+use super::{feed::Next, request::http_answer};
 
 /// Time in which a browser takes the page's text, however it divides it, ns.
 const TEXT_NS: u64 = 10 * SECOND_NS;

@@ -3,9 +3,8 @@
 //! The recorder ends before the verdict. So it leaves address and secret in the run's private folder, and the supervisor listens
 //! there. A request waits until the report is written.
 
-use std::fs;
 use std::net::{SocketAddr, TcpListener};
-use std::time::Duration;
+use std::{fs, time::Duration};
 
 use masseter_runtime::clock::{self, SECOND_NS};
 use masseter_runtime::conversation::{Limits, Newcomers};

@@ -4,8 +4,7 @@
 //! secret of the URL. A web page is Foxglove's or one of this machine. The host is an address: a name could be another
 //! site's that now leads here.
 
-use std::fmt::Display;
-use std::net::IpAddr;
+use std::{fmt::Display, net::IpAddr};
 
 use tungstenite::handshake::server::{Request, create_response, write_response};
 use tungstenite::http::header::{HOST, ORIGIN, SEC_WEBSOCKET_PROTOCOL, UPGRADE};

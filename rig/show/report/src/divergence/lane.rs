@@ -1,8 +1,7 @@
 //! The messages of one publisher on one topic side by side, and how the difference of each field grows.
 
-use std::array;
-use std::cmp::Ordering;
 use std::collections::{BTreeMap, VecDeque};
+use std::{array, cmp::Ordering};
 
 use masseter_recording::{Columns, Field, Number, Recorded, Topic};
 use serde::Serialize;

@@ -6,10 +6,8 @@
 mod differences;
 mod lane;
 
-use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::BufReader;
 use std::path::{Path, PathBuf};
+use std::{collections::BTreeMap, fs::File, io::BufReader};
 
 use anyhow::{Context, ensure};
 use masseter_recording::{Columns, Digester, Digests, Reader, Recorded, Topic, is_kept, recording_at};

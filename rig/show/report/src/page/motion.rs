@@ -20,8 +20,7 @@ use serde::Serialize;
 use serde_json::Value;
 
 use super::times::{in_unit, limit, plain, since_s};
-use crate::table;
-use crate::text::or_dash;
+use crate::{table, text::or_dash};
 
 /// Directions of the base, and where they point.
 const DIRECTIONS: [[&str; 2]; 3] = [["x", "forward"], ["y", "to the left"], ["z", "up"]];

@@ -9,10 +9,8 @@ use masseter_page::{
     Across, Block, Cell, Chart, Column, Limit, Points, Scale, Section, Series, Style, Table, Tone,
 };
 use masseter_recording::{Manifest, Usage};
-use masseter_runtime::realtime::scheduling::Obtained;
-use masseter_runtime::schedule::CycleSchedule;
-use masseter_scenario::wording::grouped;
-use masseter_scenario::{MotionConfig, Scenario};
+use masseter_runtime::{realtime::scheduling::Obtained, schedule::CycleSchedule};
+use masseter_scenario::{MotionConfig, Scenario, wording::grouped};
 
 use super::times::{limit, motion_s, plain, since_s};
 use crate::table;

@@ -1,8 +1,7 @@
 //! What `masseter compare` writes: tables, figures with their caption, and a page with all of it.
 
-use std::collections::BTreeSet;
 use std::fs::{self, File};
-use std::path::Path;
+use std::{collections::BTreeSet, path::Path};
 
 use anyhow::Context;
 use masseter_judge::Statistic;
