@@ -39,7 +39,7 @@ def test_a_motor_without_force_lets_its_load_fall(drives: Maker) -> None:
     drive = bus.drive(3)
     drive.load_n = 10.0
     drive.begin("torque_loss", 1.0)
-    with pytest.raises(DriveFault, match="8611h"):
+    with pytest.raises(DriveFault, match="8400h"):
         move(node, 20_000)
     assert drive.has_struck("torque_loss")
     assert drive.position_m < 0.15
