@@ -113,9 +113,10 @@ impl EventRecord {
         text.trim_end().to_owned()
     }
 
-    /// Whether the controller reports that the jaw left its path.
-    pub(crate) fn is_off_path(&self) -> bool {
-        matches!(self.cause, Code::Known(Cause::TrackingLost | Cause::OrientationLost))
+    /// Whether the controller stops the rig because the jaw left its path.
+    pub(crate) fn stops_off_path(&self) -> bool {
+        let is_off_path = matches!(self.cause, Code::Known(Cause::TrackingLost | Cause::OrientationLost));
+        is_off_path && self.enters(ControllerState::SafeStop)
     }
 
     /// In which value and limit are shown. Cycles and times of the bus are numbers as they are.

@@ -100,7 +100,7 @@ impl Outage {
         self.missed as f64 >= self.of as f64 * EXPLAINS
     }
 
-    /// Whether a deviation that stopped the rig may come from them. One lost cycle is enough, as for a check of the path.
+    /// Whether a deviation that stopped the rig may come from them. One skipped deadline is enough.
     pub fn explains_a_deviation(self) -> bool {
         self.missed > 0
     }

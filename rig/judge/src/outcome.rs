@@ -222,7 +222,9 @@ pub(crate) fn excuse(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     }
     let lost_s = timing.lost_longest as f64 * manifest.scenario.period_s();
     let beyond_s = manifest.scenario.controller.overdue_s;
-    let is_off_path = figures.first_fault().is_some_and(EventRecord::is_off_path);
+    // No lost cycle excuses a declared fault that led the jaw off its path.
+    let is_off_path =
+        figures.declared_cause().is_none() && figures.first_fault().is_some_and(EventRecord::stops_off_path);
     let explains = if is_off_path { Outage::explains_a_deviation } else { Outage::explains_the_stop };
     let outage = figures.outage.filter(|outage| explains(*outage));
     match (&manifest.ending, figures.stopped_by) {

@@ -444,7 +444,7 @@ impl Axis {
         if state == self.power.state {
             return;
         }
-        (self.power.state, self.power.leaves_for) = (state, None);
+        (self.power.state, self.power.leaves_for, self.fleeing_steps) = (state, None, 0);
         self.following.restart(self.power.is_in_fault());
         self.interrupt_mode();
         match state {

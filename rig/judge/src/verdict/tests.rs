@@ -408,7 +408,7 @@ fn a_safe_stop_is_one_unless_the_machine_alone_explains_it() {
         run.manifest.ending = Ending::SafeStop;
         run.disturb();
         run.figures.outage = Some(Outage { missed, of: 100 });
-        run.figures.events.push((&Event::new(Source::Controller, EventKind::Fault, cause)).into());
+        run.figures.events.push(stop_by(Source::Controller, cause));
         let found = Verdict::new(&run.manifest, &run.figures);
         assert_eq!(found.exit_code, exit_code, "{cause:?} after {missed} missed: {}", found.reason);
     }
@@ -418,6 +418,25 @@ fn a_safe_stop_is_one_unless_the_machine_alone_explains_it() {
         run.refuse();
     });
     assert_eq!(outcome, Exit::Invalid, "the rig never had real time");
+}
+
+/// One lost cycle explains a stop off the path alone: not a report beside a later stop, nor one of somebody else.
+#[test]
+fn a_report_of_a_deviation_that_stops_nothing_excuses_no_later_stop() {
+    let reported = Event::new(Source::Controller, EventKind::Fault, Cause::TrackingLost);
+    for event in [(&reported).into(), stop_by(Source::Master, Cause::TrackingLost)] {
+        let mut run = Run::new();
+        run.manifest.ending = Ending::SafeStop;
+        run.disturb();
+        run.figures.outage = Some(Outage { missed: 1, of: 100 });
+        run.figures.events.push(event);
+        assert_eq!(Verdict::new(&run.manifest, &run.figures).exit_code, Exit::SafeStop);
+    }
+}
+
+fn stop_by(source: Source, cause: Cause) -> crate::EventRecord {
+    let [from, to] = [ControllerState::Running, ControllerState::SafeStop].map(ControllerState::code);
+    (&Event { from, to, ..Event::new(source, EventKind::Fault, cause) }).into()
 }
 
 /// An average beyond its limit may be what the stop came for.
