@@ -12,7 +12,7 @@ from playwright.sync_api import sync_playwright
 PAGE = (Path(sys.argv[1]) / "study.html").resolve()
 BROWSER = sys.argv[2] if len(sys.argv) > 2 else None
 PHONE = {"viewport": {"width": 390, "height": 844}, "is_mobile": True}
-# How the page is opened, and the brightness of its ground in either theme.
+# The brightness of the page's ground in either theme, then the ways to open the page.
 LIGHT, DARK = range(200, 256), range(60)
 VIEWS = [({}, LIGHT), ({"color_scheme": "dark"}, DARK), (PHONE, LIGHT)]
 

@@ -1,7 +1,7 @@
 //! The drive's axis under CiA 402: power states, modes of operation, and the objects that show them.
 //!
 //! An axis handles no frames and works in SI units. [`Axis`] sequences its parts: [`Positioning`] and [`Homing`] return
-//! commands, the servo follows the [`Demand`], [`FollowingErrorMonitor`] supervises the servo. [`Parameters`] is
+//! commands, the servo follows the [`Demand`], [`supervision`] judges both. [`Parameters`] is
 //! the configuration in the object dictionary.
 
 mod demand;
@@ -13,6 +13,7 @@ pub(crate) mod parameters;
 mod power;
 mod profile;
 mod servo;
+mod supervision;
 
 use masseter_can::canopen::EmergencyCode;
 use masseter_can::cia402::{Controlword, DriveState, StateCommand, StatusBit, Statusword};
@@ -27,10 +28,8 @@ use motion::{Mode, Motion, MotionCommand, NewTargets, PositionView, clamp};
 use parameters::{Offsets, Parameters};
 use power::PowerStage;
 use profile::Profile;
-use servo::{FollowingErrorMonitor, ServoLimits};
-
-/// Steps in which an axis gets faster ahead of its demand until that is a fault. A jump of the encoder makes one.
-const FLEEING_STEPS: u32 = 3;
+use servo::ServoLimits;
+use supervision::{FollowingErrorMonitor, RunawayMonitor};
 
 /// One axis.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
@@ -45,8 +44,7 @@ pub(crate) struct Axis {
     parameters: Parameters,
     demand: Demand,
     following: FollowingErrorMonitor,
-    /// Steps in a row in which the axis got faster ahead of its demand.
-    fleeing_steps: u32,
+    runaway: RunawayMonitor,
     positioning: Positioning,
     pub(super) homing: Homing,
     mode: Mode,
@@ -81,7 +79,7 @@ impl Axis {
             quirks,
             demand: Demand::Brake,
             following: FollowingErrorMonitor::default(),
-            fleeing_steps: 0,
+            runaway: RunawayMonitor::default(),
             positioning: Positioning::default(),
             homing: Homing::default(),
             mode: Mode::from_number(objects.get(names::MODE)).unwrap_or(Mode::CyclicPosition),
@@ -444,7 +442,8 @@ impl Axis {
         if state == self.power.state {
             return;
         }
-        (self.power.state, self.power.leaves_for, self.fleeing_steps) = (state, None, 0);
+        (self.power.state, self.power.leaves_for) = (state, None);
+        self.runaway = RunawayMonitor::default();
         self.following.restart(self.power.is_in_fault());
         self.interrupt_mode();
         match state {
@@ -484,69 +483,6 @@ impl Axis {
         if is_complete {
             self.enter(self.power.leaves_for.unwrap_or(self.power.state.after_completion()), now_ns);
         }
-    }
-
-    /// Judges the last count of an axis under torque; returns whether a jump has become a fault. The reaction is the brake:
-    /// no loop shall follow the jump.
-    fn supervise_encoder(&mut self, now_ns: u64) -> bool {
-        let jumps =
-            self.demand != Demand::Brake && self.drivetrain.servo.is_jump(self.coordinates.counted_m());
-        if jumps {
-            self.enter(DriveState::Fault, now_ns);
-        }
-        jumps
-    }
-
-    /// Judges the velocity against the demand; returns whether their distance is a new fault. An axis that stops stays near its
-    /// ramp; a halt and a change of mode are no stops. An axis in operation may lag, catch up and overshoot after a step of its
-    /// targets, but does not get faster and faster ahead of its demand. The reaction is the brake: such a loop closes over a wrong
-    /// position, or lacks the force (IEC 61800-5-2, SS1-r).
-    fn supervise_velocity(&mut self, now_ns: u64, command: ServoCommand, before_m_s: f64) -> bool {
-        let ServoCommand::Follow(demanded) = command else { return false };
-        let is_stopping = self.power.leaves_for.is_some()
-            || matches!(self.power.state, DriveState::QuickStopActive | DriveState::FaultReactionActive);
-        let servo = &self.drivetrain.servo;
-        let Motion { position_m, velocity_m_s } = servo.motion;
-        let apart_m_s = velocity_m_s - demanded.velocity_m_s;
-        let is_apart = apart_m_s.abs() > servo.runaway_m_s();
-        let side = apart_m_s.signum();
-        let is_fleeing = is_apart
-            && (position_m - demanded.position_m) * side > servo.runaway_m()
-            && (velocity_m_s - before_m_s) * side > 0.0;
-        self.fleeing_steps = if is_fleeing { self.fleeing_steps + 1 } else { 0 };
-        let runs_away = is_apart && is_stopping || self.fleeing_steps >= FLEEING_STEPS;
-        let is_new = runs_away && !self.power.is_in_fault();
-        if runs_away {
-            self.enter(DriveState::Fault, now_ns);
-        }
-        is_new
-    }
-
-    /// Judges the error of the servo from its demanded position.
-    fn supervise_following(&mut self, now_ns: u64, command: ServoCommand) -> bool {
-        let Some(window_m) = self.parameters.following_window_m else { return false };
-        let error_m = match command {
-            ServoCommand::Follow(demanded) => demanded.position_m - self.measured_m(),
-            ServoCommand::Brake | ServoCommand::Speed { .. } | ServoCommand::Force { .. } => 0.0,
-        };
-        if !self.following.exceeds(now_ns, error_m, window_m, self.parameters.following_timeout_ns) {
-            return false;
-        }
-        self.enter(self.power.state.after_fault(), now_ns);
-        self.following.is_fault = true;
-        true
-    }
-
-    /// Compares the last count with a second encoder at the joint; returns whether their distance has become a fault.
-    /// The reaction is the brake instead of a ramp, because the true position is unknown.
-    pub(super) fn compare_encoders(&mut self, now_ns: u64, joint_m: f64) -> bool {
-        let Some(limit_m) = self.quirks.encoders_apart_m else { return false };
-        let is_apart = (self.coordinates.counted_m() - joint_m).abs() > limit_m;
-        let fails = is_apart && self.power.state != DriveState::Fault;
-        if fails {
-            self.enter(DriveState::Fault, now_ns);
-        }
-        fails
     }
 
     /// Executes a command of the mode of operation.

@@ -1,8 +1,7 @@
 //! The servo loops of a drive: P position loop with velocity feed-forward, PI velocity loop, force limit. Also force
 //! control within a range of velocities, and the holding brake.
 //!
-//! The loops depend on neither CANopen nor time: the caller gives the command of every step. The monitor of the
-//! following error (6065h, 6066h) only judges; the reaction is the axis' matter.
+//! The loops depend on neither CANopen nor time: the caller gives the command of every step. They supervise nothing.
 
 use super::demand::ServoCommand;
 use super::motion::{Motion, clamp};
@@ -12,7 +11,7 @@ use crate::ratings::Ratings;
 const VELOCITY_FILTER_S: f64 = 5e-4;
 /// Largest distance of an axis' velocity from the demanded one, as a share of the drive's velocity.
 const RUNAWAY_SHARE: f64 = 0.25;
-/// Time that an axis ahead of its demand has been so fast, for the way that is no overshoot.
+/// Time at that velocity for the way that is no overshoot after late SYNCs.
 const RUNAWAY_S: f64 = 3e-3;
 /// Largest way of a measured position in a step, in ways at the drive's velocity.
 const MOST_WAYS: f64 = 10.0;
@@ -173,31 +172,6 @@ impl Servo {
     }
 }
 
-/// Memory of the supervision.
-#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
-pub(super) struct FollowingErrorMonitor {
-    /// Since when the error has been outside its window, ns.
-    outside_since_ns: Option<u64>,
-    /// Whether the drive is in fault because of it: statusword bit 13 of the position modes.
-    pub(super) is_fault: bool,
-}
-
-impl FollowingErrorMonitor {
-    /// Judges an error (m); whether it has been outside the window for longer than the time out.
-    pub(super) fn exceeds(&mut self, now_ns: u64, error_m: f64, window_m: f64, timeout_ns: u64) -> bool {
-        if error_m.abs() <= window_m {
-            self.outside_since_ns = None;
-            return false;
-        }
-        now_ns - *self.outside_since_ns.get_or_insert(now_ns) > timeout_ns
-    }
-
-    /// Supervision begins anew in another power state; the fault lasts as long as the drive is in fault.
-    pub(super) fn restart(&mut self, is_in_fault: bool) {
-        *self = Self { outside_since_ns: None, is_fault: self.is_fault && is_in_fault };
-    }
-}
-
 #[cfg(test)]
 mod servo_tests {
 
@@ -293,38 +267,5 @@ mod limit_tests {
             assert!(servo.motion.velocity_m_s.abs() < servo.runaway_m_s());
         }
         assert!(servo.is_jump(0.27 + 2e-5));
-    }
-}
-
-#[cfg(test)]
-mod following_tests {
-    use super::*;
-
-    #[test]
-    fn a_following_error_counts_beyond_window_and_time_out() {
-        for error_m in [0.011, -0.011] {
-            let mut monitor = FollowingErrorMonitor::default();
-            let mut exceeds = |now_ns, error_m| monitor.exceeds(now_ns, error_m, 0.01, 20);
-            assert!(!exceeds(1000, 0.01) && !exceeds(2000, -0.01), "at the edge of the window");
-            assert!(!exceeds(3000, error_m) && !exceeds(3020, error_m));
-            assert!(exceeds(3021, error_m) && exceeds(3022, error_m));
-            assert!(!exceeds(3023, 0.0));
-            assert!(!exceeds(3024, error_m) && !exceeds(3044, error_m) && exceeds(3045, error_m), "anew");
-            monitor.restart(false);
-            assert!(!monitor.exceeds(3046, error_m, 0.01, 20), "anew");
-        }
-    }
-
-    #[test]
-    fn a_following_error_that_is_a_fault_is_one_as_long_as_the_drive_is_in_fault() {
-        let mut monitor = FollowingErrorMonitor::default();
-        monitor.restart(true);
-        assert!(!monitor.is_fault, "another fault");
-        monitor.is_fault = true;
-        assert!(monitor.is_fault);
-        monitor.restart(true);
-        assert!(monitor.is_fault);
-        monitor.restart(false);
-        assert!(!monitor.is_fault);
     }
 }

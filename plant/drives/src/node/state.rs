@@ -158,9 +158,9 @@ const TEMPERATURE: u8 = 0x08;
 /// The number of errors that the drive can report: room for each of them once.
 const COUNT: usize = 12;
 
-/// The errors that put the drive into fault and last until a reset. These are a following error beyond window and time
-/// out, an encoder that jumps or contradicts another one, an axis that leaves the ramp of its stop or flees from its
-/// demand, a loss of control (6007h), and a logic supply that is too low.
+/// The errors that put the drive into fault and last until a reset. In this order: the following error beyond window and
+/// time out; an encoder that jumps or contradicts another one; an axis off the ramp of its stop or ahead of its demand; the
+/// loss of control (6007h); a logic supply that is too low.
 const FAULTS: [EmergencyCode; 5] = [
     EmergencyCode::FOLLOWING_ERROR,
     EmergencyCode::POSITION_SENSOR,

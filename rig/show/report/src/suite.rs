@@ -343,10 +343,11 @@ impl SuiteReport {
 
     /// The result of all in a word.
     pub fn word(&self) -> &'static str {
-        match (self.tested.iter().any(TestedScenario::is_short), self.unrun.is_empty()) {
-            (true, _) => "FAILED",
-            (false, true) => "ok",
-            (false, false) => "INTERRUPTED",
+        match self.exit() {
+            Exit::Passed if self.unrun.is_empty() => "ok",
+            Exit::Passed => "INTERRUPTED",
+            Exit::Invalid => "INVALID",
+            _ => "FAILED",
         }
     }
 

@@ -8,7 +8,9 @@ use std::sync::LazyLock;
 
 use masseter_judge::{Breach, Check, CheckResult, FaultFigures, Figures, Verdict};
 use masseter_runtime::messages::codes::EventKind;
-use masseter_scenario::{AxisFault, DriveFault, FaultConfig, FaultKindConfig, Quantity, Scenario};
+use masseter_scenario::{
+    AxisFault, ChecksConfig, DriveFault, FaultConfig, FaultKindConfig, Quantity, Scenario,
+};
 use serde::{Deserialize, Serialize};
 
 /// The matrix of faults: what detects each of them.
@@ -143,13 +145,9 @@ impl Run<'_> {
         let is_let_go = self.storm.faults.iter().any(|fault| moves_on(fault.kind));
         // Pressed against its stops, the jaw gives way as the drives let go.
         let is_pressed = self.left_path().is_some() && self.has_undetected();
-        // The check of the faults fails where a fault was detected beyond the limits: the axis then runs into its brake.
-        let is_late = self
-            .verdict
-            .checks
-            .iter()
-            .any(|check| check.name == "faults" && check.result == CheckResult::Failed);
-        let is_excused = is_let_go || is_pressed || is_late;
+        let is_excused = is_let_go
+            || is_pressed
+            || self.figures.faults.iter().any(|fault| was_detected_late(fault, &self.storm.checks));
         (check.result == CheckResult::Failed && !is_excused).then(|| check.finding.clone())
     }
 
@@ -212,8 +210,17 @@ fn is_as_in_matrix(fault: &FaultConfig) -> bool {
     is_always_reported(fault.kind) && is_as_large && is_as_long && is_of_every_frame
 }
 
+/// Whether a fault was detected when the jaw was beyond the limits: the axis then runs into its brake.
+fn was_detected_late(fault: &FaultFigures, checks: &ChecksConfig) -> bool {
+    let is_beyond =
+        fault.deviation_mm > checks.tracking_max_mm || fault.deviation_deg > checks.tracking_max_deg;
+    is_beyond && fault.detection.is_some()
+}
+
 #[cfg(test)]
 mod tests {
+    use masseter_judge::Detection;
+    use masseter_runtime::messages::codes::{Cause, Source};
     use masseter_scenario::{BusFault, EncoderFault, ProcessFault};
 
     use super::*;
@@ -229,6 +236,26 @@ mod tests {
             "the matrix has no faults of processes"
         );
         assert_eq!(longest_ns(AxisFault::Jam.into()) / 1_000_000, 237);
+    }
+
+    #[test]
+    fn a_fault_is_late_that_was_detected_beyond_the_limits() {
+        let detection = Detection {
+            source: Source::Master.code().into(),
+            cause: Cause::FollowingError.code().into(),
+            latency_ms: 135.0,
+            deviation_mm: 0.1,
+            deviation_deg: 0.0,
+        };
+        for (detection, deviation_mm, deviation_deg, is_late) in [
+            (Some(detection), 0.6, 0.0, true),
+            (Some(detection), 0.0, 0.6, true),
+            (Some(detection), 0.4, 0.4, false),
+            (None, 0.6, 0.6, false),
+        ] {
+            let fault = FaultFigures { detection, deviation_mm, deviation_deg, ..FaultFigures::default() };
+            assert_eq!(was_detected_late(&fault, &ChecksConfig::default()), is_late, "{fault:?}");
+        }
     }
 
     #[test]

@@ -116,12 +116,13 @@ fn a_suite_is_invalid_if_the_machine_spoiled_all_that_did_not_pass() {
         [passed(1.0), judged("INVALID", Exit::Invalid, "a", 0.0), judged("FAIL", Exit::Failed, "a", -1.0)];
     let [passed, spoiled, failed] =
         judgements.map(|judgement| TestedScenario { is_simulated: false, ..tested("one", vec![judgement]) });
-    for (tested, exit) in [
-        (vec![passed.clone()], Exit::Passed),
-        (vec![passed, spoiled.clone(), spoiled.clone()], Exit::Invalid),
-        (vec![failed, spoiled], Exit::Failed),
+    for (tested, exit, word) in [
+        (vec![passed.clone()], Exit::Passed, "INTERRUPTED"),
+        (vec![passed, spoiled.clone(), spoiled.clone()], Exit::Invalid, "INVALID"),
+        (vec![failed, spoiled], Exit::Failed, "FAILED"),
     ] {
-        assert_eq!(report(tested, None).exit(), exit);
+        let report = report(tested, None);
+        assert_eq!((report.exit(), report.word()), (exit, word));
     }
 }
 
