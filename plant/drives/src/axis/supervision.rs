@@ -1,9 +1,6 @@
-//! What an axis supervises by itself, and its reaction: jumps of the encoder, the velocity, the following error (6065h,
-//! 6066h), a second encoder. The state machine of the drive and its messages are not here.
+//! Monitors of the following error (6065h, 6066h) and of an axis that runs away. They only judge; the reaction is the axis' matter.
 
-use super::demand::ServoCommand;
 use super::motion::Motion;
-use super::{Axis, Demand, DriveState};
 
 /// Supervision of the following error.
 #[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
@@ -44,7 +41,13 @@ pub(super) struct RunawayMonitor {
 impl RunawayMonitor {
     /// Judges a step from the velocity before; whether the axis has run ahead for too many steps. `limits`: way (m) and
     /// velocity (m/s) ahead of the demand.
-    fn exceeds(&mut self, before_m_s: f64, motion: Motion, demanded: Motion, limits: [f64; 2]) -> bool {
+    pub(super) fn exceeds(
+        &mut self,
+        before_m_s: f64,
+        motion: Motion,
+        demanded: Motion,
+        limits: [f64; 2],
+    ) -> bool {
         let [most_m, most_m_s] = limits;
         let apart_m_s = motion.velocity_m_s - demanded.velocity_m_s;
         let side = apart_m_s.signum();
@@ -53,65 +56,6 @@ impl RunawayMonitor {
             && (motion.velocity_m_s - before_m_s) * side > 0.0;
         self.steps = if runs_ahead { self.steps + 1 } else { 0 };
         self.steps >= RUNAWAY_STEPS
-    }
-}
-
-impl Axis {
-    /// Judges the last count of an axis under torque; returns whether a jump has become a fault. The reaction is the brake:
-    /// no loop shall follow the jump.
-    pub(super) fn supervise_encoder(&mut self, now_ns: u64) -> bool {
-        let jumps =
-            self.demand != Demand::Brake && self.drivetrain.servo.is_jump(self.coordinates.counted_m());
-        if jumps {
-            self.enter(DriveState::Fault, now_ns);
-        }
-        jumps
-    }
-
-    /// Judges the velocity against the demand; returns whether their distance is a new fault. An axis that stops stays near its
-    /// ramp; a halt and a change of mode are no stops. In operation [`RunawayMonitor`] judges. The reaction is the brake: such a
-    /// loop closes over a wrong position, or lacks the force (IEC 61800-5-2, SS1-r).
-    pub(super) fn supervise_velocity(&mut self, now_ns: u64, command: ServoCommand, before_m_s: f64) -> bool {
-        let ServoCommand::Follow(demanded) = command else { return false };
-        let is_stopping = self.power.leaves_for.is_some()
-            || matches!(self.power.state, DriveState::QuickStopActive | DriveState::FaultReactionActive);
-        let servo = &self.drivetrain.servo;
-        let motion = servo.motion;
-        let most_m_s = servo.runaway_m_s();
-        let leaves_ramp = is_stopping && (motion.velocity_m_s - demanded.velocity_m_s).abs() > most_m_s;
-        let runs_away = self.runaway.exceeds(before_m_s, motion, demanded, [servo.runaway_m(), most_m_s]);
-        let is_new = (leaves_ramp || runs_away) && !self.power.is_in_fault();
-        if leaves_ramp || runs_away {
-            self.enter(DriveState::Fault, now_ns);
-        }
-        is_new
-    }
-
-    /// Judges the error of the servo from its demanded position.
-    pub(super) fn supervise_following(&mut self, now_ns: u64, command: ServoCommand) -> bool {
-        let Some(window_m) = self.parameters.following_window_m else { return false };
-        let error_m = match command {
-            ServoCommand::Follow(demanded) => demanded.position_m - self.measured_m(),
-            ServoCommand::Brake | ServoCommand::Speed { .. } | ServoCommand::Force { .. } => 0.0,
-        };
-        if !self.following.exceeds(now_ns, error_m, window_m, self.parameters.following_timeout_ns) {
-            return false;
-        }
-        self.enter(self.power.state.after_fault(), now_ns);
-        self.following.is_fault = true;
-        true
-    }
-
-    /// Compares the last count with a second encoder at the joint; returns whether their distance has become a fault.
-    /// The reaction is the brake instead of a ramp, because the true position is unknown.
-    pub(crate) fn compare_encoders(&mut self, now_ns: u64, joint_m: f64) -> bool {
-        let Some(limit_m) = self.quirks.encoders_apart_m else { return false };
-        let is_apart = (self.coordinates.counted_m() - joint_m).abs() > limit_m;
-        let fails = is_apart && self.power.state != DriveState::Fault;
-        if fails {
-            self.enter(DriveState::Fault, now_ns);
-        }
-        fails
     }
 }
 
