@@ -165,6 +165,7 @@ impl Dynamics {
         let acceleration = self.acceleration;
         let forces_on_bodies = StepForces {
             axes: &forces,
+            speeds_m_s,
             joints: joints * -(twist + acceleration * step_s),
             contact,
             others: load - payload.map_or(Vector6::zeros(), |payload| payload * acceleration),

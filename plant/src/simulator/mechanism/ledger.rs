@@ -42,6 +42,8 @@ pub(crate) struct Ledger {
 /// The forces of a step on the bodies.
 pub(super) struct StepForces<'a> {
     pub(super) axes: &'a AxesForces,
+    /// Speeds of the axes at the beginning.
+    pub(super) speeds_m_s: Vector6<f64>,
     /// Wrenches on the platform (N, N m): hinges and balls, teeth and food, pushes and payload.
     pub(super) joints: Vector6<f64>,
     pub(super) contact: Vector6<f64>,
@@ -58,8 +60,7 @@ impl Ledger {
         acceleration: &Twist,
         step_s: f64,
     ) {
-        let actuators = &motion.jacobian.actuators;
-        let (speeds_m_s, gains_m_s2) = (actuators * twist, actuators * acceleration);
+        let (speeds_m_s, gains_m_s2) = (&forces.speeds_m_s, motion.jacobian.actuators * acceleration);
         (self.power_w, self.growth_w_s, self.elapsed_s) = ([0.0; WORKS], [0.0; WORKS], 0.0);
         let AxesForces { force_n, driven, braked, resisting_kg, .. } = forces.axes;
         for axis in 0..AXES {

@@ -85,17 +85,6 @@ impl PortSet {
         self.high |= other.high;
     }
 
-    /// The ports behind that one.
-    #[inline]
-    fn above(self, port: usize) -> Self {
-        let behind = (u64::MAX - 1) << (port & 63);
-        if port < 64 {
-            Self { low: self.low & behind, high: self.high }
-        } else {
-            Self { low: 0, high: self.high & behind }
-        }
-    }
-
     #[inline]
     fn iter(self) -> impl Iterator<Item = usize> {
         let Self { mut low, mut high } = self;
@@ -317,11 +306,18 @@ impl Nodes {
     /// The lowest port with the most urgent identifier wins. Frames of later ports with the same identifier are
     /// compared with its frame; the result has the frame that stays on the bus.
     fn arbitrate(&self, ports: PortSet, start_ns: u64) -> Option<(ArbitrationResult, Candidate)> {
-        let winner = self.candidates(ports, start_ns).min_by_key(Candidate::id)?;
-        let (mut arbitration, mut strongest) = (ArbitrationResult::default(), winner);
-        arbitration.admit(winner);
-        let rivals = self.candidates(ports.above(winner.port), start_ns);
-        for rival in rivals.filter(|rival| rival.id() == winner.id()) {
+        let mut candidates = self.candidates(ports, start_ns);
+        let (mut arbitration, mut strongest) = (ArbitrationResult::default(), candidates.next()?);
+        arbitration.admit(strongest);
+        for rival in candidates {
+            if rival.id() > strongest.id() {
+                continue;
+            }
+            if rival.id() < strongest.id() {
+                (arbitration, strongest) = (ArbitrationResult::default(), rival);
+                arbitration.admit(strongest);
+                continue;
+            }
             let difference = first_difference(&strongest.queued.frame, &rival.queued.frame);
             let Some(difference) = difference else {
                 arbitration.admit(rival);
