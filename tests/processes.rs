@@ -1,5 +1,5 @@
-//! Runs in real time: three processes, what they leave, and what becomes of a run when one of them dies, hangs or is stopped for a
-//! moment, at chosen cycles of the controller's sequence. Nothing here judges speed: `tests/realtime/disturbed.py` hits
+//! Runs in real time: three processes, and what they leave. At chosen cycles of the controller's sequence one of them dies, hangs
+//! or is stopped for a moment. Nothing here judges speed: `tests/realtime/disturbed.py` hits
 //! processes at random moments, and measures how soon a rig reacts.
 
 use std::fs;

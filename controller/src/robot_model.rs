@@ -166,7 +166,7 @@ impl RobotModel {
         Ok(Jacobian::of_legs(&self.model.mechanism, &legs).actuators.transpose().into())
     }
 
-    /// The forces of the axes (N) that give the platform an acceleration (m/s², rad/s²) in a motion, against a wrench on
+    /// The forces of the axes (N) that give the platform an acceleration (m/s², rad/s²) in a motion. The wrench acts on
     /// the platform (N, then N m about its origin, base axes). Friction of the assumed model is included.
     ///
     /// # Errors

@@ -1,5 +1,5 @@
-"""The book of the documents in a browser: its search answers twenty questions of first readers, each third page loads without an error and fits a phone, all of
-them with EVERY_CASE=1, and axe finds nothing serious in the light and the dark theme.
+"""The book of the documents in a browser: its search answers twenty questions of first readers. Each third page loads
+without an error and fits a phone, every page with EVERY_CASE=1. axe finds nothing serious in the light and the dark theme.
 
 Usage: book.py FOLDER [CHROMIUM]
 """

@@ -1,6 +1,6 @@
-"""The page of a run that goes on, in a browser: it keeps up, its charts and the mechanism move, a parameter is changed, a request
-out of range is refused in words until a good one comes, the run is stopped, its report takes the place of the page at the same
-address, and nothing but the rig is asked.
+"""The page of a run that goes on, in a browser: it keeps up, and its charts and the mechanism move. A parameter
+is changed; a request out of range is refused in words until a good one comes. The run is stopped, and its report takes the place
+of the page at the same address. The page asks nothing but the rig.
 
 Usage: live.py MASSETER FOLDER [CHROMIUM]
 """

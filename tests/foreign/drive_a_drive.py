@@ -1,7 +1,7 @@
 """python-canopen over python-can, a foreign master, meets our emulated drives through `masseter can serve`.
 
-Boots a drive, reads and writes its objects, remaps a PDO, takes it through the CiA 402 state machine and moves its
-axis, in profile position and in cyclic synchronous position. Transfers data in blocks, both ways.
+Boots a drive, reads and writes its objects, remaps a PDO, and takes the drive through the CiA 402 state machine. Moves its
+axis in profile position and in cyclic synchronous position. Transfers data in blocks, both ways.
 
 usage: drive_a_drive.py MASSETER
 """

@@ -1,7 +1,7 @@
 """Reads the workflow that `masseter init` lays down, with a real parser, and runs its scripts in a shell.
 
-Fails when the file is no YAML, when a step is neither an action nor a script, when a script fails, or when a file is
-missing that the workflow keeps. The step that builds must fail before its variables are entered, with a message that
+Fails when the file is no YAML, or when a step is neither an action nor a script. Fails when a script fails, or when a file that
+the workflow keeps is missing. The step that builds must fail before its variables are entered, with a message that
 names the empty one and the file; once they are entered it must give them to cargo.
 """
 

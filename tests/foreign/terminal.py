@@ -1,8 +1,8 @@
 """Looks at a run on a terminal: `pyte` renders what a user sees.
 
-Fails when the progress is not rewritten in its line, when the verdict does not stand readable below it, when a line
-that is wider than the terminal wraps, when the verdict of a stop is not the last on a terminal of 24 lines, or when the terminal is not left as it was: after a run, after Ctrl-C, with
---quiet and on a terminal that only prints. Fails when words are coloured against NO_COLOR or --color, or are not where
+The progress is rewritten in its line, and the verdict stands readable below it. A line wider than the terminal does not wrap.
+The verdict of a stop is the last line on a terminal of 24 lines. The terminal is left as it was after a run, after Ctrl-C, with
+--quiet and on a terminal that only prints. The test fails where this is not so, and when words are coloured against NO_COLOR or --color, or are not where
 --color asks for it.
 """
 

@@ -4,15 +4,15 @@
     tests/realtime/disturbed.py target/release/masseter --times 200
     tests/realtime/disturbed.py target/release/masseter --times 50 --only 'lockstep STOP' --seed 12
 
-Whatever is hit, all processes of the rig end in time with a typed exit code, nothing stays in shared memory or in the
-runtime folder, and the recording is complete or can be recovered.
+Whatever is hit, all processes of the rig end in time with a typed exit code. Nothing stays in shared memory or in the
+runtime folder. The recording is complete or can be recovered.
 
 KILL: no run passes whose process was killed before its end. The verdict names the process; a killed supervisor's run is
 judged by `masseter report`. In real time the survivor reacts within the bound, without the controller the drives lose their
 force, and a recording lacks at most its last second. `masseter clean` soon makes room after the death of all processes.
 
-PAUSE: nobody may notice a stop that is shorter than the silence after which a process counts as dead, or a recorder that
-is stopped for half of what its queues hold.
+PAUSE: a stop has no effect if it is shorter than the silence after which a process counts as dead; of the recorder, if it is
+shorter than half of what its queues hold.
 
 STOP: after a longer one the survivor stops the rig in real time. In lockstep the silent process is killed and named.
 

@@ -1,8 +1,8 @@
 //! `masseter fk` and `masseter ik`: CSV in, CSV out, one mechanism state a line.
 //!
 //! Every input line gives one output line, with `fk --all` one for every solution, in order; only comments, lines that
-//! begin with `#`, give none. A line that cannot be read, also an empty one, gives one with the status `bad_line`, is
-//! explained on standard error, and makes the command exit with 2 at the end.
+//! begin with `#`, give none. A line that cannot be read, also an empty one, gives one with the status `bad_line`. Standard
+//! error has the reason, and the command exits with 2 at the end.
 
 mod table;
 

@@ -113,8 +113,8 @@ impl Demand {
         is_limited
     }
 
-    /// Slows down from the demanded position (the actual position where none is demanded) and the actual velocity, but not from a
-    /// velocity farther than `most_apart_m_s` from all that was demanded: an encoder that jumps shows such a one. The
+    /// Slows down from the demanded position (the actual position where none is demanded) and the actual velocity. A velocity
+    /// farther than `most_apart_m_s` from all that was demanded does not count: an encoder that jumps shows such a one. The
     /// demanded velocity alone is no guide: at SYNC, the time of the command, it is zero at the end of a line. A closed
     /// brake stays closed.
     pub(super) fn slow_down(

@@ -40,8 +40,8 @@ const HEARTBEAT_WAIT_NS: u64 = MILLISECOND_NS;
 /// One drive. A clone, or the drive's serialised form, is a snapshot.
 ///
 /// The drive has no bus, no clock and no mechanics. Its caller calls [`step`](Self::step) once each step of the servo
-/// loops, delivers frames by [`receive`](Self::receive) and [`take_sync`](Self::take_sync) in the order of time, and
-/// sends the frames of [`outgoing`](Self::outgoing) after each call. [`Stand`](crate::Stand) does all of this on a
+/// loops, and delivers frames by [`receive`](Self::receive) and [`take_sync`](Self::take_sync) in the order of time. After
+/// each call the caller sends the frames of [`outgoing`](Self::outgoing). [`Stand`](crate::Stand) does all of this on a
 /// simulated wire.
 ///
 /// ```

@@ -31,8 +31,8 @@ const CHEW_S: f64 = 2.0;
 const OPENING_MM: f64 = 10.0;
 /// A side is where the jaw goes by so much, mm.
 const SIDE_MM: f64 = 1.0;
-/// A stay within this share of the way, or within [`CLOSED_M`], of the farthest place is a hold if it takes a longer share of the
-/// time than smooth movements do.
+/// A stay near the farthest place, within this share of the way or within [`CLOSED_M`], is a hold if it takes long: a longer share
+/// of the time than in smooth movements.
 const HOLD_WAY_SHARE: f64 = 0.05;
 const HOLD_TIME_SHARE: f64 = 1.0 / 3.0;
 

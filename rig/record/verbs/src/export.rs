@@ -73,7 +73,7 @@ impl FileFormat {
     }
 }
 
-/// Writes the tables. Ends with 0 if the recording is complete, 6 if messages or its end are missing, and 2 if it holds bytes
+/// Writes the tables. Ends with 0 if the recording is complete, with 6 if messages or its end are missing, with 2 if it holds bytes
 /// that Masseter did not write: what can be read is written all the same.
 pub fn export(args: &ExportArgs) -> anyhow::Result<Exit> {
     let format = args.format.of_tables()?;

@@ -1,7 +1,7 @@
 //! `masseter recording` (alias `log`): inspects, verifies and recovers recordings; `masseter export` makes tables of them.
 //!
-//! `info`, `verify` and `extract` end with 0 if the recording is complete, 6 if messages or its end are missing, and 2 if it
-//! holds bytes that Masseter did not write. `recover` ends with 0 once it has saved all readable messages. No verb changes
+//! `info`, `verify` and `extract` end with 0 if the recording is complete, and with 6 if messages or its end are missing. Bytes
+//! that Masseter did not write give 2. `recover` ends with 0 once it has saved all readable messages. No verb changes
 //! the recording it reads.
 
 use std::ffi::OsStr;
