@@ -49,6 +49,29 @@ fn the_rate_that_a_plan_promises_is_one_that_fits() {
 }
 
 #[test]
+fn the_plan_says_which_queue_an_interface_has_and_bounds_emergencies_and_sdo_behind_either() {
+    for (scenario, queue, words) in [
+        ("", "priority", "the queue of the master's interface is by priority"),
+        ("[can]\ninterfaces = ['can0', 'can1']", "fifo", "the queue of the master's interface is in order (FIFO)"),
+    ] {
+        let workspace = Workspace::new(scenario);
+        let scenario = workspace.file("scenario.toml");
+        let plan = |more: &[&str]| masseter(&[&["can", "plan", scenario.to_str().unwrap()], more].concat());
+        let table = plan(&[]);
+        assert_eq!(table.status.code(), Some(0), "{}", stdout(&table));
+        assert_eq!(stdout(&table).matches(words).count(), 2, "{}", stdout(&table));
+        let plan: Value = serde_json::from_slice(&plan(&["--format", "json"]).stdout).unwrap();
+        assert_eq!(plan["queue"], queue);
+        let rows = plan["buses"][0]["queued"].as_array().unwrap();
+        for name in ["SYNC", "EMCY 1", "SDO request 1", "SDO response 1", "heartbeat 127"] {
+            let row = rows.iter().find(|row| row["name"] == name).unwrap_or_else(|| panic!("{name}: {rows:?}"));
+            let bounds = ["priority_with_emergencies_ns", "fifo_with_emergencies_ns"];
+            assert!(bounds.iter().all(|bound| row[bound].is_u64()), "{row}");
+        }
+    }
+}
+
+#[test]
 fn every_message_of_a_run_arrives_within_the_bound_of_its_plan() {
     for scenario in
         ["duration_s = 2.0", "rate_hz = 500\nduration_s = 1.0\n[can]\nbuses = [[0, 1, 2, 3, 4, 5]]"]

@@ -10,6 +10,7 @@ use masseter_can::{BusPlan, PlannedMessage};
 use masseter_model::geometry::AXIS_NAMES;
 use masseter_plan::{read_scenario, read_scenario_with};
 use masseter_plant::{core as plant, description};
+use masseter_runtime::schedule::queued::{QueuedPlan, master_queue, queued_plans};
 use masseter_runtime::schedule::{CycleSchedule, Room, ScheduleError, plans};
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Format, result};
@@ -91,18 +92,27 @@ fn plan(args: &PlanArgs) -> anyhow::Result<Exit> {
     let plans = plans(&scenario)?;
     let room = Room::for_link(&scenario)?;
     let refusal = refusal(&scenario, &plans, &room);
+    // A refused cycle has no times at which the master queues its messages.
+    let queued = queued_plans(&scenario).unwrap_or_default();
     let text = match args.format {
         Format::Human => {
-            let tables = plans.iter().fold(String::new(), |text, plan| text + &plan.to_string() + "\n\n");
+            let plans = plans.iter().map(BusPlan::to_string).chain(queued.iter().map(QueuedPlan::to_string));
+            let tables = plans.fold(String::new(), |text, plan| text + &plan + "\n\n");
             let verdict =
                 refusal.as_ref().map_or_else(|| format!("fits; {room}"), |why| format!("refused: {why}"));
             format!("{tables}{verdict}\n")
         }
         Format::Json => {
-            let buses: Result<Vec<_>, _> = plans.iter().map(|plan| of_bus(plan, &scenario)).collect();
+            let queued = |bus| queued.iter().find(|plan| plan.bus == bus);
+            let buses = plans.iter().map(|plan| of_bus(plan, queued(plan.bus), &scenario));
             let (fits, max_rate_hz) = (refusal.is_none(), room.max_rate_hz);
-            let plan =
-                json!({ "fits": fits, "refusal": refusal, "max_rate_hz": max_rate_hz, "buses": buses? });
+            let plan = json!({
+                "fits": fits,
+                "refusal": refusal,
+                "max_rate_hz": max_rate_hz,
+                "queue": master_queue(&scenario.can),
+                "buses": buses.collect::<Result<Vec<_>, _>>()?,
+            });
             format!("{plan:#}\n")
         }
     };
@@ -120,7 +130,7 @@ fn refusal(scenario: &Scenario, plans: &[BusPlan], room: &Room) -> Option<String
     schedule.and(plant).err()
 }
 
-fn of_bus(plan: &BusPlan, scenario: &Scenario) -> Result<Value, ScheduleError> {
+fn of_bus(plan: &BusPlan, queued: Option<&QueuedPlan>, scenario: &Scenario) -> Result<Value, ScheduleError> {
     let mut alone = scenario.clone();
     alone.can.buses = vec![scenario.can.buses[plan.bus].clone()];
     Ok(json!({
@@ -130,6 +140,7 @@ fn of_bus(plan: &BusPlan, scenario: &Scenario) -> Result<Value, ScheduleError> {
         "utilisation": plan.utilisation(),
         "max_rate_hz": Room::for_link(&alone)?.max_rate_hz,
         "messages": plan.messages.iter().map(of_message).collect::<Vec<_>>(),
+        "queued": queued.map(|queued| &queued.rows),
     }))
 }
 

@@ -14,6 +14,7 @@ mod laws;
 mod pdo;
 mod plan;
 mod port_faults;
+mod queued_plan;
 mod socket_can;
 pub mod socketcand;
 mod tap;
@@ -26,6 +27,7 @@ pub use frame::{CanId, Frame, FrameError};
 pub use pdo::{EVERY_SYNC, PdoMapping, PdoMappingError, Rpdo1, Tpdo1};
 pub use plan::{BusPlan, NoReleaser, Overload, PeriodicMessage, PlannedMessage, Release};
 pub use port_faults::{Faulty, NotByPort, PortFaults};
+pub use queued_plan::{LatestArrival, Queue, QueuedMessage, Queueing, latest_arrivals};
 pub use socket_can::{
     Interface, InterfaceDetails, InterfaceNeeds, JudgedInterface, OpenError, SocketCan, bring_up_command,
     explain_errno, is_supported,

@@ -4,7 +4,7 @@
 //! and revised*, Real-Time Systems 35 (2007), equations 7 to 12: non-preemptive transmission by fixed priority. The
 //! analysis covers every instance within the longest busy period, behind the longest frame of lower priority. It assumes
 //! transmit queues by priority, an undisturbed bus, and no offsets between messages. All messages are periodic. The caller
-//! decides which messages a plan contains.
+//! decides which messages a plan contains. For queues in order (FIFO) see [`latest_arrivals`](crate::latest_arrivals).
 
 use std::fmt;
 
@@ -45,7 +45,8 @@ pub struct PlannedMessage {
     pub transmission_ns: u64,
     /// The latest release after the begin of the period, ns; `None` without a bound.
     pub jitter_ns: Option<u64>,
-    /// Longest time from release to arrival, ns; `None` without a bound.
+    /// The latest arrival after the latest release, ns; `None` without a bound. Up to the jitter longer passes from a
+    /// release that comes early.
     pub response_ns: Option<u64>,
 }
 

@@ -3,9 +3,12 @@
 //! SYNC and the drives' process data (TPDO1) go first, at offset 0. Then the controller computes. Then its targets
 //! (RPDO1) go out, before the next SYNC. The heartbeat is the last message of a node in its cycle. A drive's heartbeat
 //! follows its TPDO1; the master's heartbeat follows the RPDO1 and any SDO request. So the offsets also hold for
-//! interfaces that send in the order of their queue: SYNC waits for one heartbeat at most. An SDO exchange takes the
-//! place of its drive's process data. Emergencies (EMCY) are not in the schedule: in a cycle with an emergency, reading
-//! or command may be late, as with a disturbed bus.
+//! interfaces that send in the order of their queue, while SYNC waits for one heartbeat at most: [`queued`] has the bounds
+//! for heartbeats that meet, and for emergencies (EMCY). An SDO exchange takes the place of its drive's process data.
+//! Emergencies are not in the schedule: in a cycle with an emergency, reading or command may be late, as with a disturbed
+//! bus.
+
+pub mod queued;
 
 use std::fmt;
 
@@ -241,17 +244,27 @@ enum Drives {
 /// The offsets of the schedule hold as well. An SDO frame blocks the bus for longer than a heartbeat, but not for
 /// longer than a heartbeat and the missing process data.
 fn plans_of(scenario: &Scenario, period_ns: u64, drives: Drives) -> Result<Vec<BusPlan>, ScheduleError> {
+    let bitrate = scenario.can.bitrate()?;
+    let of_buses = messages_of(scenario, period_ns, drives)?.into_iter().enumerate();
+    of_buses.map(|(bus, messages)| Ok(BusPlan::new(bus, bitrate, period_ns, messages)?)).collect()
+}
+
+/// The messages of every bus, those of the master in the order in which it queues them.
+fn messages_of(
+    scenario: &Scenario,
+    period_ns: u64,
+    drives: Drives,
+) -> Result<Vec<Vec<PeriodicMessage>>, ScheduleError> {
     let can = &scenario.can;
-    let plan = |(bus, axes): (usize, &Vec<usize>)| {
+    let messages = |axes: &Vec<usize>| {
         let ids = axes.iter().filter_map(|&axis| Some((*can.node_ids.get(axis)?, axis)));
         let nodes = ids.map(|(id, axis)| Ok((NodeId::new(id)?, scenario.profile(axis).pdos.rpdo1())));
         let nodes = nodes.collect::<Result<Vec<_>, NodeIdError>>()?;
         let shortest = nodes.iter().min_by_key(|(_, rpdo1)| pdo_bytes(rpdo1));
         let booting = shortest.filter(|_| drives == Drives::OneBoots).map(|&(node, _)| node);
-        let messages = bus_messages(&nodes, can, period_ns, booting);
-        Ok(BusPlan::new(bus, can.bitrate()?, period_ns, messages)?)
+        Ok(bus_messages(&nodes, can, period_ns, booting))
     };
-    can.buses.iter().enumerate().map(plan).collect()
+    can.buses.iter().map(messages).collect()
 }
 
 /// Data bytes of a PDO.
@@ -276,23 +289,22 @@ fn bus_messages(
         release: None,
     };
     let mut messages = vec![message("SYNC".to_owned(), Cob::Sync, 0, period_ns)];
-    for &(node, rpdo1) in drives {
-        if booting == Some(node) {
-            // The answer may take until the end of the next cycle.
-            let sdo = |name: &str, cob| PeriodicMessage {
-                deadline_ns: 2 * period_ns,
-                ..message(format!("{name} {}", node.get()), cob, SDO_LENGTH, period_ns)
-            };
-            messages.push(sdo("SDO request", Cob::SdoRequest(node)));
-            messages.push(sdo("SDO response", Cob::SdoResponse(node)));
-            continue;
-        }
+    for &(node, rpdo1) in drives.iter().filter(|(node, _)| booting != Some(*node)) {
         let (tpdo, rpdo) = (pdo_bytes(&PdoMapping::TPDO1), pdo_bytes(&rpdo1));
         messages.push(PeriodicMessage {
             release: Some(Release { by: Cob::Sync.into(), within_ns: u64::from(can.answer_us) * 1000 }),
             ..message(format!("TPDO1 {}", node.get()), Cob::Tpdo1(node), tpdo, period_ns)
         });
         messages.push(message(format!("RPDO1 {}", node.get()), Cob::Rpdo1(node), rpdo, period_ns));
+    }
+    if let Some(node) = booting {
+        // The answer may take until the end of the next cycle.
+        let sdo = |name: &str, cob| PeriodicMessage {
+            deadline_ns: 2 * period_ns,
+            ..message(format!("{name} {}", node.get()), cob, SDO_LENGTH, period_ns)
+        };
+        messages.push(sdo("SDO request", Cob::SdoRequest(node)));
+        messages.push(sdo("SDO response", Cob::SdoResponse(node)));
     }
     for node in drives.iter().map(|&(node, _)| node).chain([MASTER_NODE]) {
         let name = format!("heartbeat {}", node.get());
