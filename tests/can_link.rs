@@ -52,7 +52,11 @@ fn the_rate_that_a_plan_promises_is_one_that_fits() {
 fn the_plan_says_which_queue_an_interface_has_and_bounds_emergencies_and_sdo_behind_either() {
     for (scenario, queue, words) in [
         ("", "priority", "the queue of the master's interface is by priority"),
-        ("[can]\ninterfaces = ['can0', 'can1']", "fifo", "the queue of the master's interface is in order (FIFO)"),
+        (
+            "[can]\ninterfaces = ['can0', 'can1']",
+            "fifo",
+            "the queue of the master's interface is in order (FIFO)",
+        ),
     ] {
         let workspace = Workspace::new(scenario);
         let scenario = workspace.file("scenario.toml");
@@ -64,7 +68,8 @@ fn the_plan_says_which_queue_an_interface_has_and_bounds_emergencies_and_sdo_beh
         assert_eq!(plan["queue"], queue);
         let rows = plan["buses"][0]["queued"].as_array().unwrap();
         for name in ["SYNC", "EMCY 1", "SDO request 1", "SDO response 1", "heartbeat 127"] {
-            let row = rows.iter().find(|row| row["name"] == name).unwrap_or_else(|| panic!("{name}: {rows:?}"));
+            let row =
+                rows.iter().find(|row| row["name"] == name).unwrap_or_else(|| panic!("{name}: {rows:?}"));
             let bounds = ["priority_with_emergencies_ns", "fifo_with_emergencies_ns"];
             assert!(bounds.iter().all(|bound| row[bound].is_u64()), "{row}");
         }

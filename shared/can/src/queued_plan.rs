@@ -122,7 +122,8 @@ pub fn latest_arrivals(
         Ok(Stream { wire_ns, place, fifo, times, latest_ns: Some(0) })
     };
     let streams = order.iter().enumerate().map(stream).collect::<Result<_, _>>()?;
-    let mut bus = Streams { cycle_ns: (cycle_ns as i64).max(1), bit_ns: bitrate.bits_to_ns(1) as i64, streams };
+    let mut bus =
+        Streams { cycle_ns: (cycle_ns as i64).max(1), bit_ns: bitrate.bits_to_ns(1) as i64, streams };
     // From no delay upwards: each message delays others, which delay it in turn.
     while bus.grow() {}
     let latest = order.iter().zip(&bus.streams).map(|((_, message), stream)| LatestArrival {
