@@ -1,4 +1,4 @@
-//! The observations of a tap on a bus (frames and errors, each with its time), and the lines of their log.
+//! The observations of a tap on a bus: frames and errors, each with its time.
 //!
 //! The coding of errors is that of `SocketCAN`'s error messages (`linux/can/error.h`). The identifier has the flag
 //! 2000_0000h and the class; the data bytes have the details, bytes 6 and 7 the error counters. Byte 5, which the
@@ -136,48 +136,9 @@ impl ErrorReport {
     }
 }
 
-/// Log lines of candump: `(1436509052.249713) vcan0 123#11223344`.
-///
-/// Time stamps have whole microseconds, as in the format. Logs are written and not read.
-pub mod candump {
-    use std::fmt::{self, Write};
-
-    use super::Tapped;
-
-    /// Writes one line without line end. Fractions of a microsecond are cut off. An error report becomes the error
-    /// message of a `SocketCAN` interface.
-    ///
-    /// # Errors
-    /// Those of `out`.
-    ///
-    /// # Examples
-    /// ```
-    /// use masseter_can::{CanId, Frame, Received, Tapped, candump};
-    ///
-    /// let frame = Frame::fixed(CanId::standard(0x123)?, [0x11, 0x22]);
-    /// let mut line = String::new();
-    /// candump::write(&mut line, "can0", &Tapped::Frame(Received { frame, time_ns: 1_500_000 }.into()))?;
-    /// assert_eq!(line, "(0.001500) can0 123#1122");
-    /// # Ok::<(), Box<dyn std::error::Error>>(())
-    /// ```
-    pub fn write(out: &mut impl Write, interface: &str, tapped: &Tapped) -> fmt::Result {
-        let micros = tapped.time_ns() / 1000;
-        write!(out, "({}.{:06}) {interface} ", micros / 1_000_000, micros % 1_000_000)?;
-        match tapped {
-            Tapped::Frame(tapped) => write!(out, "{}", tapped.frame),
-            Tapped::Error(report) => {
-                let (id, data) = report.encode();
-                write!(out, "{id:08X}#")?;
-                data.iter().try_for_each(|byte| write!(out, "{byte:02X}"))
-            }
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::CanId;
 
     #[test]
     fn reports_are_coded_as_the_kernel_does() {
@@ -194,32 +155,5 @@ mod tests {
             assert_eq!(ErrorReport::decode(7, id, data), Ok(report));
         }
         assert_eq!(ErrorReport::decode(7, 0x2000_0001, [0; 8]), Err(ErrorReportError(0x2000_0001)));
-    }
-
-    fn line(time_ns: u64, frame: Frame) -> String {
-        let mut line = String::new();
-        candump::write(&mut line, "vcan0", &Tapped::Frame(Received { frame, time_ns }.into())).unwrap();
-        line
-    }
-
-    #[test]
-    fn the_example_of_can_utils_is_written() {
-        let frame = Frame::fixed(CanId::standard(0x123).unwrap(), [0x11, 0x22, 0x33, 0x44]);
-        assert_eq!(line(1_436_509_052_249_713_999, frame), "(1436509052.249713) vcan0 123#11223344");
-    }
-
-    #[test]
-    fn extended_and_empty_frames_are_written_as_candump_does() {
-        let extended = CanId::extended(0x123).unwrap();
-        assert_eq!(line(0, Frame::fixed(extended, [])), "(0.000000) vcan0 00000123#");
-    }
-
-    #[test]
-    fn an_error_report_becomes_the_message_of_the_kernel() {
-        let kind = ErrorKind::State(ErrorState::BusOff);
-        let report = ErrorReport { time_ns: 5000, port: 2, kind, tec: 255, rec: 3 };
-        let mut line = String::new();
-        candump::write(&mut line, "can1", &Tapped::Error(report)).unwrap();
-        assert_eq!(line, "(0.000005) can1 20000240#000000000002FF03");
     }
 }

@@ -2,6 +2,7 @@
 
 mod boot;
 mod enabling;
+mod logs;
 mod lost;
 mod peer;
 mod recovery;
