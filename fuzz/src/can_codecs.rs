@@ -93,7 +93,13 @@ fn tapped(data: &[u8]) {
     assert_eq!(tap::decode(&tap::encode(bus, &tapped)), Ok(tapped));
     let mut line = String::new();
     candump::write(&mut line, "can0", &tapped).expect("a string takes any text");
-    assert!(line.contains(") can0 ") && line.contains('#'), "{line}");
+    let read = candump::read(&line).next().expect("a line").expect("what is written is read");
+    assert_eq!((read.interface, read.tapped.time_ns()), ("can0", time_ns / 1000 * 1000), "{line}");
+    assert_eq!(
+        read.tapped.frame().map(|read| read.frame),
+        tapped.frame().map(|tapped| tapped.frame),
+        "{line}"
+    );
 }
 
 /// A stream means the same however it comes in pieces.

@@ -16,7 +16,7 @@ use super::*;
 use crate::master::link::{Address, Buses};
 
 /// Periods by which a frame may come early or late: answers come before the look at the bus in a cycle or after it.
-const WINDOW_PERIODS: u64 = 5;
+const WINDOW_PERIODS: u64 = 3;
 /// A comment of the log with a fault that the master must report.
 const FAULT: &str = "# fault: ";
 /// A comment with the time from the master's start to its first SYNC, ms; 0 without one.
