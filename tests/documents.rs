@@ -20,8 +20,9 @@ fn project() -> &'static Path {
 }
 
 fn documents() -> Vec<PathBuf> {
-    let folders = [".", "docs", "docs/tutorials", "notes", "plant/drives", "shared/can"]
-        .map(|folder| project().join(folder));
+    let folders =
+        [".", "docs", "docs/tutorials", "notes", "plant/drives", "plant/src/master/logs", "shared/can"]
+            .map(|folder| project().join(folder));
     let files =
         folders.iter().flat_map(|folder| fs::read_dir(folder).unwrap()).map(|entry| entry.unwrap().path());
     files.filter(|path| path.extension().is_some_and(|extension| extension == "md")).collect()

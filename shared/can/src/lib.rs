@@ -30,7 +30,7 @@ pub use pdo::{EVERY_SYNC, PdoMapping, PdoMappingError, Rpdo1, Tpdo1};
 pub use plan::{BusPlan, NoReleaser, Overload, PeriodicMessage, PlannedMessage, Release};
 pub use port_faults::{Faulty, NotByPort, PortFaults};
 pub use queued_plan::{LatestArrival, Queue, QueuedMessage, Queueing, latest_arrivals};
-pub use replay::{Difference, ReplayBus, ReplayError, Role};
+pub use replay::{Deviation, Difference, ReplayBus, ReplayError, Role};
 pub use socket_can::{
     Interface, InterfaceDetails, InterfaceNeeds, JudgedInterface, OpenError, SocketCan, bring_up_command,
     explain_errno, is_supported,

@@ -29,53 +29,33 @@ pub enum ReplayError {
     NoFrames(String),
 }
 
-/// The first difference between a log and its replay. Lines count from 1.
+/// The first difference between a log and its replay.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum Difference {
-    /// Another frame of the identifier.
-    #[error("line {line}: {expected} in the log, but {got} is sent")]
-    Frame {
-        /// The line.
-        line: usize,
-        /// Its frame.
-        expected: Frame,
-        /// The frame sent instead.
-        got: Frame,
-    },
-    /// The right frame, too early or too late.
-    #[error("line {line}: {frame} is sent {} µs {}", off_ns.unsigned_abs() / 1000, if *off_ns < 0 { "early" } else { "late" })]
-    Time {
-        /// The line.
-        line: usize,
-        /// Its frame.
-        frame: Frame,
-        /// Deviation from the time of the line, ns.
-        off_ns: i64,
-    },
-    /// A frame that is not in the rest of the log.
-    #[error("before line {line}: {got} is sent, and the rest of the log has no frame of this identifier")]
-    Surplus {
-        /// The next line that is to be sent.
-        line: usize,
-        /// The frame.
-        got: Frame,
-    },
-    /// A frame that was not sent before the end of the replay.
-    #[error("line {line}: {expected} is not sent")]
-    Unsent {
-        /// The line.
-        line: usize,
-        /// Its frame.
-        expected: Frame,
-    },
-    /// A frame that was not received before the end of the replay.
-    #[error("line {line}: {frame} is not received")]
-    Unread {
-        /// The line.
-        line: usize,
-        /// Its frame.
-        frame: Frame,
-    },
+#[error("line {line}: {frame} {deviation}")]
+pub struct Difference {
+    /// The line in the log, from 1.
+    pub line: usize,
+    /// Its frame.
+    pub frame: Frame,
+    /// What is different.
+    pub deviation: Deviation,
+}
+
+/// How a replay differs from a line of its log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum Deviation {
+    /// Another frame is sent in its place: one of its identifier, or one of whose identifier the rest of the log has none.
+    #[error("in the log, but {0} is sent")]
+    Sent(Frame),
+    /// The frame is sent that much too late, or too early where negative, ns.
+    #[error("is sent {} µs {}", .0.unsigned_abs() / 1000, if *.0 < 0 { "early" } else { "late" })]
+    Off(i64),
+    /// It is not sent within the window, or before the end of the replay.
+    #[error("is not sent")]
+    NotSent,
+    /// It is not received before the end of the replay.
+    #[error("is not received")]
+    NotReceived,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -84,6 +64,12 @@ struct Line {
     received: Received,
     is_own: bool,
     is_done: bool,
+}
+
+impl Line {
+    fn deviates(&self, deviation: Deviation) -> Difference {
+        Difference { line: self.number, frame: self.received.frame, deviation }
+    }
 }
 
 /// One interface of a log of candump, as the port of one party.
@@ -101,7 +87,7 @@ struct Line {
 ///
 /// ```
 /// use masseter_can::canopen::{NodeId, ObjectAddress, SdoRequest};
-/// use masseter_can::{Bus, Difference, ReplayBus, Role};
+/// use masseter_can::{Bus, ReplayBus, Role};
 ///
 /// let log = "(1.000000) can0 601#4000100000000000\n(1.000200) can0 581#4300100092010200\n";
 /// let replay = || ReplayBus::new(log, "can0", |id| if id.number() == 0x601 { Role::Sent } else { Role::Received });
@@ -174,16 +160,8 @@ impl ReplayBus {
         if let Some(difference) = self.difference {
             return Err(difference);
         }
-        let Some(&Line { number: line, received: Received { frame, .. }, is_own, .. }) =
-            self.lines.iter().find(|line| !line.is_done)
-        else {
-            return Ok(());
-        };
-        Err(if is_own {
-            Difference::Unsent { line, expected: frame }
-        } else {
-            Difference::Unread { line, frame }
-        })
+        let Some(rest) = self.lines.iter().find(|line| !line.is_done) else { return Ok(()) };
+        Err(rest.deviates(if rest.is_own { Deviation::NotSent } else { Deviation::NotReceived }))
     }
 
     fn unsent_lines(&self) -> impl Iterator<Item = &Line> {
@@ -192,21 +170,21 @@ impl ReplayBus {
 
     /// Takes a frame of the party as its next one of that identifier.
     fn compare(&mut self, now_ns: u64, got: Frame) -> Result<(), Difference> {
-        let Some(next) = self.unsent_lines().map(|line| line.number).next() else { return Ok(()) };
+        let Some(&next) = self.unsent_lines().next() else { return Ok(()) };
+        // An answer that waits for this frame leads to other differences, which are only consequences.
+        if next.received.frame != got && now_ns.saturating_sub(next.received.time_ns) > self.window_ns {
+            return Err(next.deviates(Deviation::NotSent));
+        }
         let is_it = |line: &&mut Line| line.is_own && !line.is_done && line.received.frame.id() == got.id();
         let Some(line) = self.lines.iter_mut().find(is_it) else {
-            return Err(Difference::Surplus { line: next, got });
+            return Err(next.deviates(Deviation::Sent(got)));
         };
         let Received { frame, time_ns } = line.received;
         if frame != got {
-            return Err(Difference::Frame { line: line.number, expected: frame, got });
+            return Err(line.deviates(Deviation::Sent(got)));
         }
         if now_ns.abs_diff(time_ns) > self.window_ns {
-            return Err(Difference::Time {
-                line: line.number,
-                frame,
-                off_ns: now_ns.wrapping_sub(time_ns) as i64,
-            });
+            return Err(line.deviates(Deviation::Off(now_ns.wrapping_sub(time_ns) as i64)));
         }
         line.is_done = true;
         Ok(())
@@ -276,6 +254,10 @@ mod tests {
         Frame::new(CanId::standard(id).unwrap(), data).unwrap()
     }
 
+    fn differs(line: usize, frame: Frame, deviation: Deviation) -> Difference {
+        Difference { line, frame, deviation }
+    }
+
     fn received(bus: &mut ReplayBus, now_ns: u64) -> Vec<u32> {
         std::iter::from_fn(|| bus.receive(now_ns).unwrap())
             .map(|received| received.frame.id().number())
@@ -306,7 +288,7 @@ mod tests {
         bus.send(0, frame(0x601, &[1])).unwrap();
         assert_eq!(received(&mut bus, u64::MAX), [0x582, 0x581], "in the order of the log");
         assert_eq!(bus.next_due(CanId::standard(0x080).unwrap()).unwrap().time_ns, 1_010_000_000);
-        assert_eq!(bus.finish(), Err(Difference::Unsent { line: 9, expected: frame(0x080, &[]) }));
+        assert_eq!(bus.finish(), Err(differs(9, frame(0x080, &[]), Deviation::NotSent)));
     }
 
     #[test]
@@ -316,14 +298,14 @@ mod tests {
         play(&mut bus, &[(20, 0x080, &[]), (20, 0x77F, &[5]), (20, 0x000, &[1, 1])]);
         assert_eq!(bus.finish(), Ok(()));
         let mut bus = replay();
-        AS_RECORDED.iter().for_each(|&(_, id, data)| bus.send(0, frame(id, data)).unwrap());
-        assert_eq!(bus.finish(), Err(Difference::Unread { line: 3, frame: frame(0x701, &[0]) }));
+        for (_, id, data) in AS_RECORDED {
+            bus.send(0, frame(id, data)).unwrap();
+        }
+        assert_eq!(bus.finish(), Err(differs(3, frame(0x701, &[0]), Deviation::NotReceived)));
     }
 
     #[test]
     fn every_change_of_what_is_sent_is_a_difference() {
-        let sync = frame(0x080, &[]);
-        let (first, second) = (frame(0x601, &[1]), frame(0x601, &[5]));
         let with = |place: usize, other: &[(u64, u16, &'static [u8])], removed: usize| {
             let mut frames = AS_RECORDED.to_vec();
             frames.splice(place..place + removed, other.iter().copied());
@@ -332,28 +314,20 @@ mod tests {
             bus.finish()
         };
         assert_eq!(with(0, &[], 0), Ok(()));
-        let other = frame(0x601, &[1, 0]);
-        let changed = Difference::Frame { line: 4, expected: first, got: other };
-        assert_eq!(with(1, &[(0, 0x601, &[1, 0])], 1), Err(changed));
-        assert_eq!(
-            with(1, &[], 1),
-            Err(Difference::Frame { line: 4, expected: first, got: second }),
-            "removed"
-        );
-        assert_eq!(with(4, &[], 1), Err(Difference::Unsent { line: 10, expected: second }));
-        let start = frame(0x000, &[1, 1]);
-        assert_eq!(with(3, &[(0, 0x000, &[1, 1])], 0), Err(Difference::Surplus { line: 9, got: start }));
-        let answer = frame(0x581, &[]);
-        assert_eq!(
-            with(3, &[(0, 0x581, &[])], 0),
-            Err(Difference::Surplus { line: 9, got: answer }),
-            "of others"
-        );
-        let early = Difference::Time { line: 9, frame: sync, off_ns: -7_000_000 };
-        assert_eq!(with(3, &[(3, 0x080, &[])], 1), Err(early));
-        assert_eq!(early.to_string(), "line 9: 080# is sent 7000 µs early");
-        let late = Difference::Time { line: 10, frame: second, off_ns: 9_900_000 };
-        assert_eq!(with(4, &[(20, 0x601, &[5])], 1), Err(late));
+        let differs = |line, id, data: &[u8], deviation| Err(differs(line, frame(id, data), deviation));
+        let other = Deviation::Sent(frame(0x601, &[1, 0]));
+        assert_eq!(with(1, &[(0, 0x601, &[1, 0])], 1), differs(4, 0x601, &[1], other));
+        assert_eq!(with(1, &[], 1), differs(4, 0x601, &[1], Deviation::NotSent), "removed");
+        assert_eq!(with(4, &[], 1), differs(10, 0x601, &[5], Deviation::NotSent), "removed at the end");
+        let start = Deviation::Sent(frame(0x000, &[1, 1]));
+        assert_eq!(with(3, &[(0, 0x000, &[1, 1])], 0), differs(9, 0x080, &[], start), "inserted");
+        let answer = Deviation::Sent(frame(0x581, &[]));
+        assert_eq!(with(3, &[(0, 0x581, &[])], 0), differs(9, 0x080, &[], answer), "a frame of others");
+        let early = with(3, &[(3, 0x080, &[])], 1);
+        assert_eq!(early, differs(9, 0x080, &[], Deviation::Off(-7_000_000)));
+        assert_eq!(early.unwrap_err().to_string(), "line 9: 080# is sent 7000 µs early");
+        let late = with(4, &[(20, 0x601, &[5])], 1);
+        assert_eq!(late, differs(10, 0x601, &[5], Deviation::Off(9_900_000)));
     }
 
     #[test]

@@ -72,8 +72,8 @@ impl<'a> Replay<'a> {
             let cycle = 1 + (sync_ns - start_ns + period_ns / 2) / period_ns;
             let syncs: Vec<_> = self.wires.0.iter().map(|bus| bus.next_due(Cob::Sync.into())).collect();
             self.master.begin_cycle(Wake::on_time(cycle, sync_ns), &mut self.wires);
-            for (bus, sync) in syncs.into_iter().enumerate() {
-                sync.into_iter().for_each(|sync| self.master.note_sync(bus, sync.time_ns));
+            for (bus, sync) in syncs.into_iter().enumerate().filter_map(|(bus, sync)| Some((bus, sync?))) {
+                self.master.note_sync(bus, sync.time_ns);
             }
             self.master.collect(sync_ns + schedule.reading_by_ns, &mut self.wires);
             let command = self.command(cycle);
