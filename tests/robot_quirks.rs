@@ -151,9 +151,9 @@ fn assert_passes(row: &Row) {
     );
 }
 
-/// `run --dry` and `run`: exit codes and what they say.
+/// `run --dry` and `run`: exit codes and what they say. The dry run eases ten times as long as is set: 2 s, and 10 s without it.
 pub(crate) fn play_runs(robot: &Workspace) -> [(Option<i32>, String); 2] {
-    [&["--dry"][..], &[]].map(|arguments| {
+    [&["--dry", "--set", "controller.ease_s=0.2"][..], &[]].map(|arguments| {
         let output = robot.run_virtual(arguments);
         fs::remove_dir_all(robot.run_folder()).expect("a run leaves a folder");
         (output.status.code(), stdout(&output) + &stderr(&output))
@@ -187,14 +187,16 @@ fn every_quirk_does_in_a_run_what_the_table_says() {
 }
 
 #[test]
-fn every_quirk_is_found_by_its_step_and_passes_with_its_profile() {
+fn every_quirk_is_found_by_its_step() {
     let rows = rows();
     for kind in QuirkKindConfig::ALL {
         let name = serde_json::to_string(kind).unwrap();
         assert!(rows.iter().any(|row| row.quirk.contains(&name)), "docs/robot.md has no row of {name}");
     }
-    for row in &rows {
-        assert_found(row);
-        assert_passes(row);
-    }
+    rows.iter().for_each(assert_found);
+}
+
+#[test]
+fn every_quirk_passes_with_its_profile() {
+    rows().iter().for_each(assert_passes);
 }
