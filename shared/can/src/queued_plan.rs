@@ -123,7 +123,7 @@ pub fn latest_arrivals(
     };
     let streams = order.iter().enumerate().map(stream).collect::<Result<_, _>>()?;
     let mut bus =
-        Streams { cycle_ns: (cycle_ns as i64).max(1), bit_ns: bitrate.bits_to_ns(1) as i64, streams };
+        Traffic { cycle_ns: (cycle_ns as i64).max(1), bit_ns: bitrate.bits_to_ns(1) as i64, streams };
     // From no delay upwards: each message delays others, which delay it in turn.
     while bus.grow() {}
     let latest = order.iter().zip(&bus.streams).map(|((_, message), stream)| LatestArrival {
@@ -156,7 +156,7 @@ struct Stream {
 
 /// The messages of a bus, the most urgent first.
 #[derive(Debug)]
-struct Streams {
+struct Traffic {
     cycle_ns: i64,
     bit_ns: i64,
     streams: Vec<Stream>,
@@ -164,7 +164,7 @@ struct Streams {
 
 /// What may be sent before a frame of one message, in a busy period without a frame below one priority.
 struct Level<'a> {
-    bus: &'a Streams,
+    bus: &'a Traffic,
     /// The message.
     of: usize,
     /// The messages of its queue, then those of other queues.
@@ -205,7 +205,7 @@ impl Load {
     }
 }
 
-impl Streams {
+impl Traffic {
     /// One step of all bounds; whether one of them grew.
     fn grow(&mut self) -> bool {
         let next = |index: usize| {

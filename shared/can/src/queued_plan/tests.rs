@@ -33,7 +33,8 @@ struct RandomBus {
 impl RandomBus {
     fn new(random: &mut Pcg32) -> Self {
         let mut ids: Vec<u16> = (1..80).collect();
-        let (mut queues, mut drafts): (Vec<Queue>, Vec<(u16, u32, usize, Draft)>) = (vec![], vec![]);
+        let mut queues = Vec::new();
+        let mut drafts: Vec<(u16, u32, usize, Draft)> = Vec::new();
         for node in 0..random.random_range(1..=5) {
             queues.push(if random.random_bool(0.6) { Queue::Fifo } else { Queue::Priority });
             let mut id = || ids.swap_remove(random.random_range(0..ids.len()));
