@@ -14,7 +14,9 @@ from typing import Any, Literal
 import can
 
 from masseter_drives._native import Bench, __version__
+from masseter_drives.bridge import Bridge
 from masseter_drives.errors import (
+    BridgeError,
     BusClosedError,
     BusOffError,
     DrivesError,
@@ -25,8 +27,8 @@ from masseter_drives.errors import (
 from masseter_drives.profiles import PROFILES, FaultKind, QuirkKind
 
 __all__ = [
-    "PROFILES", "BusClosedError", "BusOffError", "Drive", "Drives", "DrivesError", "FaultKind", "FrameError", "QueueFullError",
-    "QuirkKind", "SettingError", "__version__",
+    "PROFILES", "BridgeError", "BusClosedError", "BusOffError", "Drive", "Drives", "DrivesError", "FaultKind", "FrameError",
+    "QueueFullError", "QuirkKind", "SettingError", "__version__",
 ]  # fmt: skip
 
 _LOG = logging.getLogger("can.masseter_drives")
@@ -183,6 +185,7 @@ class Drives(can.BusABC):
         #: Ids of the drives, and how many received frames this bus has lost because nobody read them.
         self.nodes, self.lost = self._world.nodes, 0
         self._networks: list[Any] = []
+        self._bridges: list[Bridge] = []
         self.channel_info = f"emulated drives {self.nodes} on channel {self.channel!r}"
         super().__init__(self.channel, can_filters)
 
@@ -222,6 +225,8 @@ class Drives(can.BusABC):
         self._world.checked()
         if self._is_shutdown:
             raise BusClosedError("this bus is closed")
+        for bridge in self._bridges:
+            bridge.check()
         return self._world
 
     @property
@@ -251,6 +256,18 @@ class Drives(can.BusABC):
             sheet.name = f"{node}.eds"
             network.add_node(node, sheet)
         return network
+
+    def serve(self, other: can.BusABC) -> None:
+        """Joins another bus of python-can to the wire, until this bus closes: masters there find the drives.
+
+        An error of the other bus is logged, and each later call of this bus raises BridgeError.
+        """
+        world = self._open()
+        if not world.is_real:
+            raise SettingError("clock", "simulated", "another bus has real time; make the drives with clock='real'")
+        if isinstance(other, Drives) and other._world is world:
+            raise SettingError("other", other.channel_info, "this bus is on the wire of the drives already")
+        self._bridges.append(Bridge(Drives(self.channel), other))
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
         if msg.is_remote_frame or msg.is_fd or msg.is_error_frame:
@@ -311,6 +328,8 @@ class Drives(can.BusABC):
             return
         for network in self._networks:
             network.disconnect()
+        for bridge in self._bridges:
+            bridge.close()
         super().shutdown()
         if self._world.is_open and self._world.pid == os.getpid():
             self._note(self._world.bench.leave(self._bus))

@@ -29,3 +29,7 @@ class FrameError(DrivesError, can.CanOperationError, ValueError):
 
 class QueueFullError(DrivesError, can.CanOperationError, TimeoutError):
     """No room for a frame: the wire is overloaded, or no time passes."""
+
+
+class BridgeError(DrivesError, can.CanOperationError):
+    """The bus beyond a bridge has failed; the cause is its error."""
