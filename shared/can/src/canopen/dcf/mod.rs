@@ -3,6 +3,8 @@
 //! [`Dcf::parse`] reads the entries of the object dictionary with their types, access, limits and values, and the node
 //! that a configuration is for. The parser skips the sections on the file, its device, bit rates and dummy mapping. The
 //! caller converts texts of other code pages to UTF-8: `String::from_utf8_lossy` changes names alone.
+//!
+//! Time and memory grow with the length of the text alone: lines and compact arrays have an upper limit.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -46,6 +48,8 @@ const COMMISSIONING: [&str; 2] = ["devicecomissioning", "devicecommissioning"];
 
 /// The lists of the objects that a file describes.
 const LISTS: [&str; 3] = ["mandatoryobjects", "optionalobjects", "manufacturerobjects"];
+/// Most bytes for the entries of compact arrays: 1000 arrays of 254 entries. A short text describes all of these.
+const MOST_COMPACT_BYTES: usize = 64 << 20;
 /// Keys that entries alone have.
 const OF_ENTRY: [&str; 3] = ["DataType", "AccessType", "ParameterValue"];
 
@@ -74,7 +78,7 @@ impl Dcf {
         let sections = Section::read_all(text)?;
         let by_name: HashMap<_, _> =
             sections.iter().map(|section| (section.name.to_ascii_lowercase(), section)).collect();
-        let mut dcf = Self::default();
+        let (mut dcf, mut room) = (Self::default(), MOST_COMPACT_BYTES);
         for section in COMMISSIONING.iter().filter_map(|name| by_name.get(*name)) {
             let Commissioning { node_id, baudrate_kbit_s } = Commissioning::read(section)?;
             dcf.commissioning.node_id = dcf.commissioning.node_id.or(node_id);
@@ -87,7 +91,7 @@ impl Dcf {
         }
         for section in &sections {
             if let Some(index) = index(section.name) {
-                dcf.add_object(index, section, &by_name)?;
+                dcf.add_object(index, section, &by_name, &mut room)?;
             } else if let Some((index, subindex)) = sub_index(section.name) {
                 if !by_name.contains_key(&format!("{index:04x}")) {
                     let of = format!("[{index:04X}sub{subindex:X}] has no section [{index:04X}]");
@@ -128,12 +132,13 @@ impl Dcf {
         index: u16,
         section: &Section<'_>,
         by_name: &HashMap<String, &Section<'_>>,
+        room: &mut usize,
     ) -> Result<(), DcfError> {
         match section.number("ObjectType", 0xFF)?.unwrap_or(0x7) {
             DOMAIN_OBJECT | 0x5..=0x7 => self.add(Entry::read(section, ObjectAddress::new(index, 0))?),
             0x8 | 0x9 => {
                 if let Some(count @ 1..) = section.number("CompactSubObj", 0xFE)? {
-                    self.add_compact(index, count as u8, section, by_name)?;
+                    self.add_compact(index, count as u8, section, by_name, room)?;
                 }
             }
             kind => {
@@ -151,10 +156,16 @@ impl Dcf {
         count: u8,
         section: &Section<'_>,
         by_name: &HashMap<String, &Section<'_>>,
+        room: &mut usize,
     ) -> Result<(), DcfError> {
         let part = |suffix| by_name.get(&format!("{index:04x}{suffix}"));
         let (names, values) = (part("name"), part("value"));
         let common = Entry::read(section, ObjectAddress::new(index, 0))?;
+        *room = room.checked_sub(usize::from(count) * common.bytes()).ok_or_else(|| {
+            let most =
+                format!("{} MiB with its compact arrays up to [{index:04X}]", MOST_COMPACT_BYTES >> 20);
+            section.refused(format!("the description needs more than {most}; lower CompactSubObj"))
+        })?;
         self.add(Entry {
             name: "Highest sub-index supported".to_owned(),
             data_type: DataType::U8,
@@ -274,6 +285,16 @@ impl Entry {
     /// The configured value, else the value of a new device.
     pub fn value(&self) -> Option<&Value> {
         self.parameter.as_ref().or(self.default.as_ref())
+    }
+
+    /// Bytes that the entry takes in memory.
+    fn bytes(&self) -> usize {
+        let values = [&self.default, &self.parameter, &self.lowest, &self.highest];
+        let texts = values.into_iter().flatten().map(|value| match value {
+            Value::Text(text) => text.len(),
+            Value::Number(_) | Value::OfNode(_) | Value::Real(_) => 0,
+        });
+        size_of::<Self>() + self.name.len() + texts.sum::<usize>()
     }
 
     /// Reads the section of an entry.

@@ -138,3 +138,53 @@ fn objects_that_a_list_names_without_a_section_are_told() {
     assert_eq!(dcf.undescribed, [0x1000, 0x2001]);
     assert!(Dcf::parse("[OptionalObjects]\n1=all").is_err());
 }
+
+const TEN_MB: usize = 10_000_000;
+
+#[test]
+fn a_description_of_ten_megabytes_is_read_whole() {
+    let mut text = String::new();
+    for index in 0x1000..=u16::MAX {
+        let name = format!(
+            "Object {index}, with a name that a vendor may give an object of a device: {}",
+            "n".repeat(60)
+        );
+        text += &format!(
+            "[{index:04X}]\nParameterName={name}\nDataType=7\nAccessType=rw\nDefaultValue={index}\n"
+        );
+    }
+    assert!(text.len() > TEN_MB, "{}", text.len());
+    let dcf = Dcf::parse(&text).unwrap();
+    assert_eq!(dcf.entries().len(), 0xF000);
+    assert!(dcf.entries().all(|entry| entry.value() == Some(&Value::Number(entry.address.index.into()))));
+}
+
+/// Without a limit, 10 MB of text become 6 GB of entries.
+#[test]
+fn ten_megabytes_that_describe_more_than_fits_into_memory_are_refused_with_their_line() {
+    let compact = |index: u16, name: &str| {
+        format!(
+            "[{index:04X}]\nParameterName={name}\nObjectType=8\nDataType=7\nAccessType=rw\nCompactSubObj=254\n"
+        )
+    };
+    let arrays: String = (0x1000..=u16::MAX).map(|index| compact(index, &"n".repeat(90))).collect();
+    assert!(arrays.len() > TEN_MB, "{}", arrays.len());
+    let error = Dcf::parse(&arrays).unwrap_err();
+    assert!(
+        error.problem.starts_with("the description needs more than 64 MiB with its compact arrays"),
+        "{error}"
+    );
+    let five_hundred: String = (0x1000..0x1000 + 500).map(|index| compact(index, "Array")).collect();
+    assert_eq!(Dcf::parse(&five_hundred).unwrap().entries().len(), 500 * 255);
+
+    for text in
+        ["n".repeat(TEN_MB), compact(0x1000, &"n".repeat(TEN_MB)), format!("[{}]", "n".repeat(TEN_MB))]
+    {
+        let error = Dcf::parse(&text).unwrap_err();
+        assert!(
+            error.problem.ends_with("at most 4096 are possible, so shorten the line"),
+            "line {}",
+            error.line
+        );
+    }
+}

@@ -6,6 +6,9 @@ use std::fmt::{self, Display, Formatter};
 
 use crate::canopen::NodeId;
 
+/// The longest line, bytes. CiA 306 has 255 characters, and longer ones occur.
+const LONGEST_LINE: usize = 4096;
+
 /// A section and its keys. Names match without regard to case.
 #[derive(Debug)]
 pub(super) struct Section<'a> {
@@ -32,6 +35,12 @@ impl<'a> Section<'a> {
             let refuse = |problem| Err(DcfError { line, problem });
             if content.is_empty() || content.starts_with([';', '#']) {
                 continue;
+            }
+            if content.len() > LONGEST_LINE {
+                let length = content.len();
+                return refuse(format!(
+                    "a line of {length} bytes; at most {LONGEST_LINE} are possible, so shorten the line"
+                ));
             }
             if let Some(name) = content.strip_prefix('[').and_then(|rest| rest.strip_suffix(']')) {
                 let name = name.trim();
