@@ -140,6 +140,13 @@ def test_real_time_passes_by_itself(drives: Maker) -> None:
         bus.advance(1.0)
 
 
+@pytest.mark.parametrize("clock", ["real", "simulated"])
+def test_a_network_has_drives_that_have_booted(drives: Maker, clock: str) -> None:
+    bus = drives(nodes=[5], quirks=["two_boot_ups"], clock=clock)
+    bus.network()
+    assert [message.data for message in frames(bus, 0.0)[:2]] == [b"\0", b"\0"]
+
+
 @pytest.mark.parametrize("kind", get_args(QuirkKind))
 def test_every_quirk_boots_and_shows_in_the_data_sheet_or_on_the_bus(simulated: Maker, kind: str) -> None:
     quirk = {"kind": kind, **VALUES[kind]} if kind in VALUES else kind

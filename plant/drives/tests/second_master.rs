@@ -8,7 +8,7 @@ use canopen_rs::{
 };
 use masseter_can::canopen::{ObjectAddress, dcf::Dcf};
 use masseter_can::{Bus, CanId, Frame};
-use masseter_drives::{DriveSettings, Stand, eds};
+use masseter_drives::{DriveFault, DriveSettings, Stand, eds};
 
 const MILLISECOND_NS: u64 = 1_000_000;
 const NODE: u8 = 4;
@@ -78,6 +78,14 @@ impl Master {
 
     fn read(&mut self, index: u16, subindex: u8, kind: DataType) -> Result<Value, u32> {
         self.transfer(|client| client.read(Address::new(index, subindex), kind)).map(Option::unwrap)
+    }
+
+    /// An `INTEGER32`.
+    fn integer(&mut self, index: u16) -> i32 {
+        match self.read(index, 0, DataType::Integer32) {
+            Ok(Value::Integer32(number)) => number,
+            other => panic!("{index:04X}h: {other:?}"),
+        }
     }
 
     fn write(&mut self, index: u16, subindex: u8, value: Value) -> Result<(), u32> {
@@ -180,57 +188,174 @@ fn it_boots_and_reads_every_entry_of_the_data_sheet_as_its_type() {
 fn it_moves_the_axis_in_profile_position_and_profile_velocity() {
     let mut master = Master::new();
     master.heartbeat();
-    let position = |master: &mut Master| match master.read(0x6064, 0, DataType::Integer32) {
-        Ok(Value::Integer32(position)) => position,
-        other => panic!("{other:?}"),
-    };
-    let start = position(&mut master);
+    let start = master.integer(0x6064);
     master.write(0x6060, 0, Value::Integer8(1)).unwrap();
     master.enable();
     master.write(0x607A, 0, Value::Integer32(start + 5000)).unwrap();
     master.write(0x6040, 0, Value::Unsigned16(0x1F)).unwrap();
     master.run_ms(300);
-    assert!(master.has_state(1 << 10, 1 << 10) && (position(&mut master) - start - 5000).abs() < 20);
+    assert!(master.has_state(1 << 10, 1 << 10) && (master.integer(0x6064) - start - 5000).abs() < 20);
     master.write(0x6060, 0, Value::Integer8(3)).unwrap();
     master.write(0x60FF, 0, Value::Integer32(-50_000)).unwrap();
     master.run_ms(100);
     let velocity = master.read(0x606C, 0, DataType::Integer32).unwrap();
     assert!(matches!(velocity, Value::Integer32(-51_000..=-49_000)), "{velocity:?}");
-    master.write(0x6040, 0, Value::Unsigned16(0x02)).unwrap();
-    master.run_ms(100);
-    assert!(master.has_state(0x4F, 0x40), "a quick stop");
 }
 
 #[test]
-fn it_maps_the_fourth_pdos_and_exchanges_them_at_sync() {
+fn it_maps_each_pdo_and_exchanges_them_at_sync() {
+    for number in 1..=4 {
+        let mut master = Master::new();
+        master.heartbeat();
+        let place = u16::from(number) - 1;
+        let maps = [
+            (0x1800, pdo::PdoKind::Transmit, [MappingEntry::new(0x606C, 0, 32), MappingEntry::new(0x6061, 0, 8)]),
+            (0x1400, pdo::PdoKind::Receive, [MappingEntry::new(0x60FF, 0, 32), MappingEntry::new(0x6060, 0, 8)]),
+        ];
+        let [sent, received] = maps.map(|(first, kind, entries)| {
+            let communication = first + place;
+            let cob_id = pdo::default_cob_id(kind, number, master.node).unwrap();
+            let invalid = Value::Unsigned32(1 << 31 | u32::from(cob_id));
+            master.write(communication, 1, invalid).unwrap();
+            master.write(communication + 0x200, 0, Value::Unsigned8(0)).unwrap();
+            for (place, entry) in (1..).zip(entries) {
+                master.write(communication + 0x200, place, Value::Unsigned32(entry.to_u32())).unwrap();
+            }
+            master.write(communication + 0x200, 0, Value::Unsigned8(2)).unwrap();
+            master.write(communication, 2, Value::Unsigned8(1)).unwrap();
+            master.write(communication, 1, Value::Unsigned32(cob_id.into())).unwrap();
+            cob_id
+        });
+        master.command(NmtCommand::StartRemoteNode);
+        while master.heartbeat() != NmtState::Operational {}
+        master.enable();
+        let [velocity, mode] = [20_000_i32.to_le_bytes().to_vec(), vec![9]];
+        for _ in 0..100 {
+            master.send(received, &[velocity.clone(), mode.clone()].concat());
+            master.send(sync::SYNC_COB_ID, &[]);
+            master.run_ms(1);
+        }
+        master.heard.clear();
+        master.send(sync::SYNC_COB_ID, &[]);
+        let data = master.receive(sent);
+        let actual = i32::from_le_bytes(data[..4].try_into().unwrap());
+        assert!((actual - 20_000).abs() < 500 && data[4] == 9, "PDO {number}: {data:02X?}");
+    }
+}
+
+#[test]
+fn it_changes_the_state_of_the_node_that_heartbeats_show() {
+    let mut master = Master::new();
+    for (command, state) in [
+        (NmtCommand::StartRemoteNode, NmtState::Operational),
+        (NmtCommand::StopRemoteNode, NmtState::Stopped),
+        (NmtCommand::EnterPreOperational, NmtState::PreOperational),
+        (NmtCommand::ResetCommunication, NmtState::Initialising),
+        (NmtCommand::ResetNode, NmtState::Initialising),
+    ] {
+        master.run_ms(200);
+        master.heard.clear();
+        master.command(command);
+        master.run_ms(1);
+        assert_eq!(master.heartbeat(), state, "{command:?}");
+    }
+}
+
+/// The drive supervises the master: its heartbeats stay away after the first.
+#[test]
+fn it_is_missed_by_the_drive_when_its_heartbeats_stay_away() {
     let mut master = Master::new();
     master.heartbeat();
-    let maps = [
-        (0x1803, pdo::PdoKind::Transmit, [MappingEntry::new(0x606C, 0, 32), MappingEntry::new(0x6061, 0, 8)]),
-        (0x1403, pdo::PdoKind::Receive, [MappingEntry::new(0x60FF, 0, 32), MappingEntry::new(0x6060, 0, 8)]),
-    ];
-    for (communication, kind, entries) in maps {
-        let cob_id = pdo::default_cob_id(kind, 4, master.node).unwrap();
-        for (place, entry) in (1..).zip(entries) {
-            master.write(communication + 0x200, place, Value::Unsigned32(entry.to_u32())).unwrap();
-        }
-        master.write(communication + 0x200, 0, Value::Unsigned8(2)).unwrap();
-        master.write(communication, 1, Value::Unsigned32(cob_id.into())).unwrap();
+    master.write(0x1016, 1, Value::Unsigned32(0x7F << 16 | 50)).unwrap();
+    let me = NodeId::new(0x7F).unwrap();
+    let alive = nmt::encode_heartbeat(NmtState::Operational);
+    for _ in 0..5 {
+        master.send(nmt::heartbeat_cob_id(me), &alive);
+        master.run_ms(40);
     }
-    master.command(NmtCommand::StartRemoteNode);
-    while master.heartbeat() != NmtState::Operational {}
+    assert!(master.heard.iter().all(|frame| frame.id().number() != 0x84), "none is missed yet");
+    master.run_ms(20);
+    let emergency = EmergencyMessage::decode(&master.receive(0x084)).unwrap();
+    assert_eq!(emergency.error_code, 0x8130);
+}
+
+/// An enabled drive in that mode.
+fn enabled(mode: i8) -> Master {
+    let mut master = Master::new();
+    master.heartbeat();
+    master.write(0x6060, 0, Value::Integer8(mode)).unwrap();
     master.enable();
-    let [velocity, mode] = [20_000_i32.to_le_bytes().to_vec(), vec![9]];
-    for _ in 0..100 {
-        master.send(0x500 + u16::from(NODE), &[velocity.clone(), mode.clone()].concat());
+    master
+}
+
+#[test]
+fn it_homes_the_axis_where_the_axis_is() {
+    let mut master = enabled(6);
+    master.write(0x6098, 0, Value::Integer8(37)).unwrap();
+    master.write(0x6040, 0, Value::Unsigned16(0x1F)).unwrap();
+    master.run_ms(10);
+    assert!(master.has_state(1 << 12, 1 << 12), "attained");
+    assert!(master.integer(0x6064).abs() < 20);
+}
+
+#[test]
+fn it_leads_the_axis_by_cyclic_positions() {
+    let mut master = enabled(8);
+    let start = master.integer(0x6064);
+    for step in 1..=100 {
+        master.write(0x607A, 0, Value::Integer32(start + 10 * step)).unwrap();
         master.send(sync::SYNC_COB_ID, &[]);
         master.run_ms(1);
     }
-    master.heard.clear();
-    master.send(sync::SYNC_COB_ID, &[]);
-    let data = master.receive(0x480 + u16::from(NODE));
-    let actual = i32::from_le_bytes(data[..4].try_into().unwrap());
-    assert!((actual - 20_000).abs() < 500 && data[4] == 9, "{data:02X?}");
+    master.run_ms(100);
+    assert!((master.integer(0x6064) - start - 1000).abs() < 20);
+}
+
+/// 10 ‰ of 500 N move 1 kg by 5 m/s².
+#[test]
+fn it_gives_torques_of_a_profile_and_cyclic_ones() {
+    for mode in [4, 10] {
+        let mut master = enabled(mode);
+        master.write(0x6071, 0, Value::Integer16(10)).unwrap();
+        master.send(sync::SYNC_COB_ID, &[]);
+        master.run_ms(20);
+        let torque = master.read(0x6077, 0, DataType::Integer16).unwrap();
+        assert!(matches!(torque, Value::Integer16(9..=11)), "mode {mode}: {torque:?}");
+        assert!(master.integer(0x606C) > 10_000);
+    }
+}
+
+/// How far an axis at 0.1 m/s comes to rest with that option of 605Ah, 605Dh or 605Eh.
+fn way_to_rest(option: (u16, i16), stop: fn(&mut Master)) -> (Master, i32) {
+    let mut master = enabled(3);
+    master.write(option.0, 0, Value::Integer16(option.1)).unwrap();
+    master.write(0x60FF, 0, Value::Integer32(100_000)).unwrap();
+    master.run_ms(100);
+    assert!((master.integer(0x606C) - 100_000).abs() < 2000);
+    let before = master.integer(0x6064);
+    stop(&mut master);
+    master.run_ms(200);
+    assert!(master.integer(0x606C).abs() < 500, "{option:X?}");
+    let way = master.integer(0x6064) - before;
+    (master, way)
+}
+
+#[test]
+fn it_stops_the_axis_quickly_or_by_halt_and_finds_a_fault_at_rest_as_the_options_say() {
+    let quick = |master: &mut Master| master.write(0x6040, 0, Value::Unsigned16(0x02)).unwrap();
+    for (option, state) in [(2, 0x40), (6, 0x07)] {
+        let (mut master, _) = way_to_rest((0x605A, option), quick);
+        assert!(master.has_state(0x4F, state), "605Ah = {option}");
+    }
+    let halt = |master: &mut Master| master.write(0x6040, 0, Value::Unsigned16(0x10F)).unwrap();
+    let fail = |master: &mut Master| master.stand.drive(0).set_fault(DriveFault::Fault, Some(1.0));
+    let ways = |object, stop| [1, 2].map(|option| way_to_rest((object, option), stop));
+    for (object, [slow, quick], state) in [(0x605D, ways(0x605D, halt), 0x07), (0x605E, ways(0x605E, fail), 0x08)] {
+        for (mut master, _) in [slow.0, quick.0] {
+            assert!(master.has_state(0x4F, state), "{object:X}h");
+        }
+        assert!(slow.1 > 2 * quick.1, "{object:X}h: {} and {} increments", slow.1, quick.1);
+    }
 }
 
 #[test]
@@ -242,6 +367,15 @@ fn it_reads_the_emergency_of_process_data_that_are_too_short() {
     master.send(0x200 + u16::from(NODE), &[6]);
     let emergency = EmergencyMessage::decode(&master.receive(0x080 + u16::from(NODE))).unwrap();
     assert_eq!((emergency.error_code, emergency.error_register.0), (0x8210, 0x11));
+}
+
+#[test]
+fn it_transfers_data_in_segments_both_ways() {
+    let mut master = Master::new();
+    master.heartbeat();
+    let text = Value::VisibleString("a text that needs more than one segment".try_into().unwrap());
+    master.write(USER_DATA.index, USER_DATA.subindex, text.clone()).unwrap();
+    assert_eq!(master.read(USER_DATA.index, USER_DATA.subindex, DataType::VisibleString), Ok(text));
 }
 
 #[test]

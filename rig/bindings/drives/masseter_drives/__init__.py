@@ -34,6 +34,8 @@ __all__ = [
 _LOG = logging.getLogger("can.masseter_drives")
 #: The longest time that passes in one call of the native part, which signals of the system do not interrupt.
 _SLICE_NS = 10_000_000
+#: When every drive has booted: 20 ms after power-on, or twice that with a boot-up message of the boot loader.
+_BOOTED_NS = 50_000_000
 #: How often a bus in real time looks for frames.
 _LOOK_S = 0.001
 
@@ -246,9 +248,14 @@ class Drives(can.BusABC):
         return Drive(self._open(), node)
 
     def network(self) -> Any:
-        """A network of python-canopen on a bus of its own, with each drive by its data sheet. It ends with this bus."""
+        """A network of python-canopen on a bus of its own, with each booted drive by its data sheet. It ends with this bus."""
         import canopen
 
+        world = self._open()
+        while world.at_present().now_ns() < _BOOTED_NS:
+            if not world.is_real:
+                world.advance(_BOOTED_NS)
+            world.rest(world.now_ns())
         network = canopen.Network(Drives(self.channel)).connect()
         self._networks.append(network)
         for node in self.nodes:
