@@ -130,6 +130,34 @@ fn every_message_of_the_troubleshooting_is_one_of_the_code() {
     assert!(rows.len() >= 30, "only {} messages were found", rows.len());
 }
 
+/// The text of all files in a folder.
+fn code(path: &Path) -> String {
+    if path.is_dir() {
+        fs::read_dir(path).unwrap().map(|entry| code(&entry.unwrap().path())).collect()
+    } else {
+        fs::read_to_string(path).unwrap_or_default()
+    }
+}
+
+#[test]
+fn every_cell_of_the_table_of_services_is_a_test() {
+    let text = fs::read_to_string(project().join("docs/can.md")).unwrap();
+    let of_masters =
+        ["plant/src", "tests/drives", "plant/drives/tests"].map(|path| code(&project().join(path)));
+    let mut checked = 0;
+    for row in interface::table(&text, "| service |") {
+        assert_eq!(row.len(), 4, "{row:?}");
+        for (cell, code) in row[1..].iter().zip(&of_masters) {
+            for name in cell.split('`').skip(1).step_by(2) {
+                let is_there = ["fn ", "def "].iter().any(|kind| code.contains(&format!("{kind}{name}(")));
+                assert!(is_there, "{}: no test has the name {name}", row[0]);
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked >= 45, "only {checked} tests were found");
+}
+
 /// "Follow one cycle through the code" names a function before the link to the file that has it.
 #[test]
 fn every_function_of_the_architecture_is_in_the_file_beside_it() {

@@ -45,7 +45,7 @@ fn document() -> String {
 }
 
 /// The rows of the table with this head, cell by cell.
-fn table<'a>(text: &'a str, head: &str) -> Vec<Vec<&'a str>> {
+pub(super) fn table<'a>(text: &'a str, head: &str) -> Vec<Vec<&'a str>> {
     let (_, rows) = text.split_once(head).unwrap_or_else(|| panic!("no table {head}"));
     let rows = rows.lines().skip(2).take_while(|line| line.starts_with('|'));
     rows.map(|row| row.trim_matches('|').split('|').map(str::trim).collect()).collect()

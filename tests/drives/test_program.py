@@ -73,4 +73,4 @@ def test_the_readme_s_ten_lines_pass(tmp_path: Path) -> None:
         command = ["-m", "pytest", "-q", "-p", "no:cacheprovider", name] if "def test" in block else [name]
         ended = subprocess.run([sys.executable, *command], cwd=tmp_path, capture_output=True, text=True)
         assert ended.returncode == 0, ended.stdout + ended.stderr
-    assert len(blocks) == 2
+    assert len(blocks) == 3
