@@ -1,5 +1,6 @@
 """A user's program on python-canopen: enables a drive and moves it, and raises where the drive fails."""
 
+import queue
 import time
 from collections.abc import Callable
 from typing import Any
@@ -16,6 +17,20 @@ def wait_for(node: Any, what: str, holds: Callable[[int], bool], seconds: float 
             raise DriveFault(f"node {node.id}: {node.sdo[0x603F].raw:04X}h")
         if time.monotonic() > end_s:
             raise TimeoutError(f"node {node.id}: {what}")
+
+
+def reset(node: Any) -> None:
+    """Resets a node that has booted, and waits until the node has booted again.
+
+    `wait_for_bootup` of python-canopen misses a boot-up message that comes before the wait.
+    """
+    states: queue.SimpleQueue[int] = queue.SimpleQueue()
+    node.nmt.add_heartbeat_callback(states.put)
+    for expected, command in [(127, "RESET"), (0, None)]:
+        while states.get(timeout=10.0) != expected:
+            pass
+        if command:
+            node.nmt.state = command
 
 
 def enable(node: Any) -> None:

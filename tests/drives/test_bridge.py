@@ -12,7 +12,7 @@ from typing import Any
 import can
 import canopen
 import pytest
-from program import enable, move
+from program import enable, move, reset
 
 from masseter_drives import BridgeError, Drives, SettingError
 
@@ -49,8 +49,7 @@ def boot(network: canopen.Network, drives: Drives, node: int) -> Any:
     sheet: Any = io.StringIO(drives.drive(node).eds)
     sheet.name = f"{node}.eds"
     remote = network.add_node(node, sheet)
-    remote.nmt.state = "RESET"
-    remote.nmt.wait_for_bootup(10)
+    reset(remote)
     return remote
 
 

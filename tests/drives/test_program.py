@@ -9,7 +9,7 @@ from pathlib import Path
 
 import canopen
 import pytest
-from program import DriveFault, enable, move
+from program import DriveFault, enable, move, reset
 
 from masseter_drives import Drives
 
@@ -51,8 +51,7 @@ def test_a_program_that_connects_by_itself_finds_the_drives_by_their_channel(dri
         network.connect(interface="masseter", channel="bench", bitrate=1_000_000)
         network.scanner.search()
         node = network.add_node(9)
-        node.nmt.state = "RESET"
-        node.nmt.wait_for_bootup(10)
+        reset(node)
         assert bus.drive(9).state == "switch_on_disabled"
         assert network.scanner.nodes == [9]
 

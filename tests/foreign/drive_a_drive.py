@@ -6,6 +6,7 @@ axis in profile position and in cyclic synchronous position. Transfers data in b
 usage: drive_a_drive.py MASSETER
 """
 
+import queue
 import socket
 import struct
 import subprocess
@@ -157,8 +158,12 @@ def session(masseter, port, sheet):
     network.scanner.search(limit=10)
     wait_for("the scanner finds the drives of the bus", lambda: len(network.scanner.nodes) == 3)
     node = network.add_node(NODE, sheet)
+    # Before the command: `wait_for_bootup` misses a message that comes before the wait.
+    states = queue.SimpleQueue()
+    node.nmt.add_heartbeat_callback(states.put)
     node.nmt.state = "RESET"
-    node.nmt.wait_for_bootup(10)
+    while states.get(timeout=10) != 0:
+        pass
     print("ok  booted")
     check("device type 402", node.sdo[0x1000].raw & 0xFFFF == 402)
     name = node.sdo[0x1008].raw

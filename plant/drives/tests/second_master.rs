@@ -274,7 +274,7 @@ fn it_changes_the_state_of_the_node_that_heartbeats_show() {
 fn it_is_missed_by_the_drive_when_its_heartbeats_stay_away() {
     let mut master = Master::new();
     master.heartbeat();
-    master.write(0x1016, 1, Value::Unsigned32(0x7F << 16 | 50)).unwrap();
+    master.write(0x1016, 1, Value::Unsigned32(0x7F << 16 | 0x32)).unwrap();
     let me = NodeId::new(0x7F).unwrap();
     let alive = nmt::encode_heartbeat(NmtState::Operational);
     for _ in 0..5 {
@@ -382,7 +382,7 @@ fn it_transfers_data_in_segments_both_ways() {
     let mut master = Master::new();
     master.heartbeat();
     let text = Value::VisibleString(ByteString::from_bytes(b"a text in more than one segment").unwrap());
-    master.write(USER_DATA.index, USER_DATA.subindex, text.clone()).unwrap();
+    master.write(USER_DATA.index, USER_DATA.subindex, text).unwrap();
     assert_eq!(master.read(USER_DATA.index, USER_DATA.subindex, DataType::VisibleString), Ok(text));
 }
 

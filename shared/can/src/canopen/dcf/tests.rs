@@ -143,16 +143,11 @@ const TEN_MB: usize = 10_000_000;
 
 #[test]
 fn a_description_of_ten_megabytes_is_read_whole() {
-    let mut text = String::new();
-    for index in 0x1000..=u16::MAX {
-        let name = format!(
-            "Object {index}, with a name that a vendor may give an object of a device: {}",
-            "n".repeat(60)
-        );
-        text += &format!(
-            "[{index:04X}]\nParameterName={name}\nDataType=7\nAccessType=rw\nDefaultValue={index}\n"
-        );
-    }
+    let name = "A name that a vendor may give an object of a device".repeat(2);
+    let object = |index: u16| {
+        format!("[{index:04X}]\nParameterName={name}\nDataType=7\nAccessType=rw\nDefaultValue={index}\n")
+    };
+    let text: String = (0x1000..=u16::MAX).map(object).collect();
     assert!(text.len() > TEN_MB, "{}", text.len());
     let dcf = Dcf::parse(&text).unwrap();
     assert_eq!(dcf.entries().len(), 0xF000);
