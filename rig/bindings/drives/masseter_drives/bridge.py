@@ -36,8 +36,9 @@ class Bridge:
                     sink.send(message, timeout=_ROOM_S)
         except Exception as error:  # Each interface of python-can has errors of its own.
             if self._is_open:
-                self._is_open, self._error = False, error
+                self._is_open = False
                 _LOG.error("%s ended: %s", self._about, error)
+                self._error = error
 
     def check(self) -> None:
         """Raises the error that has ended the bridge."""
