@@ -28,7 +28,9 @@ COLUMNS = [
     ("median error, N", "median(bite_error_median_n)", 1),
     ("median uncertainty, N", "median(bite_uncertainty_median_n)", 1),
     ("uncertainty by error", "median(bite_uncertainty_median_n) / median(bite_error_median_n)", 1),
+    ("95 % of the errors by median", "median(bite_error_95_n) / median(bite_error_median_n)", 1),
     ("cycles covered, %", "100 * avg(bite_covered)", 1),
+    ("without estimate, %", "100 * avg(bite_missing)", 0),
     ("phantom, N", "median(bite_phantom_n)", 1),
     ("largest phantom, N", "max(bite_phantom_n)", 1),
 ]

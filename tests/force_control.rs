@@ -76,12 +76,12 @@ slide_screw_efficiency = 0.9
 #[test]
 fn the_stated_uncertainty_covers_robots_with_another_friction_than_the_model() {
     let more = "slide_friction_n = 6.5\nviscous_friction_n_s_per_m = 26.0";
-    // Where the screws are at the end of what the uncertainty is for, the error of a loaded screw is as large all the time.
+    // The uncertainty is for 95 % of the robots' cycles: a robot at the ends of several doubts has fewer.
     for (dynamics, friction, least) in [
         (more, "", 0.95),
         ("", "model = 'lugre'", 0.95),
-        (more, "model = 'lugre'\nbreakaway_ratio = 1.6", 0.95),
-        ("", "leg_screw_efficiency = 0.8\nslide_screw_efficiency = 0.8", 0.85),
+        (more, "model = 'lugre'\nbreakaway_ratio = 1.6", 0.9),
+        ("", "leg_screw_efficiency = 0.8\nslide_screw_efficiency = 0.8", 0.9),
     ] {
         let robot = format!("{DEFAULT_MODEL}[dynamics]\n{dynamics}\n[dynamics.friction]\n{friction}");
         let [_, covered] = error_and_coverage(&robot);

@@ -9,8 +9,9 @@ use masseter_runtime::named::Signal;
 use masseter_scenario::{ForceControlConfig, ForceEstimateConfig, ForceSource, Scenario};
 use nalgebra::{SVector, Vector6};
 
+use crate::forces::calibration::{Calibration, Loaded};
 use crate::pose_law::{Detour, ExternalForce, PoseLaw};
-use crate::{forces::calibration::Calibration, safety::Fault, sequencer::Sequencer};
+use crate::{safety::Fault, sequencer::Sequencer};
 
 mod calibration;
 
@@ -21,6 +22,10 @@ const LOAD_PASSES: usize = 5;
 const STEPS: f64 = 1000.0;
 /// Variance of a value within a step of 1: 1/12.
 const ROUNDING_VARIANCE: f64 = 1.0 / 12.0;
+/// Uncertainties are this many standard deviations.
+const COVERAGE: f64 = 2.0;
+/// Uncertainty of a value that is anywhere within a bound of 1: its standard deviation is 1/√3.
+const OF_BOUND: f64 = COVERAGE * 0.577_350_269_189_625_8;
 /// Time from no offset to the whole offset, s: ten times that of a drive's loops.
 const FADE_IN_S: f64 = 0.3;
 
@@ -147,6 +152,17 @@ struct Braking {
     joints: Vector6<f64>,
 }
 
+impl Braking {
+    fn loaded<'a>(&'a self, motion: &'a Motion) -> Loaded<'a> {
+        Loaded {
+            jacobian: &motion.jacobian.actuators,
+            speeds_m_s: &motion.rates_m_s,
+            coulomb_n: &self.coulomb_n,
+            screw_n: &self.screw_n,
+        }
+    }
+}
+
 impl Model {
     /// The model that the controller of a scenario assumes.
     pub(crate) fn new(scenario: &Scenario, mechanism: Mechanism) -> Self {
@@ -254,7 +270,7 @@ struct Driven {
 /// twist is the difference of the poses, and the force of a drive is the mean of that time.
 ///
 /// The bite force is the vertical component. Its uncertainty has terms for the level and the law of friction, screws, masses,
-/// delay and rounding. The uncertainty is no bound: docs/dynamics-control.md has the share of cycles that it covers.
+/// delay and rounding. The uncertainty is no bound: docs/dynamics-control.md has the terms and the share of cycles that it covers.
 #[derive(Debug, Clone)]
 struct ForceObserver {
     model: Model,
@@ -268,8 +284,7 @@ struct ForceObserver {
     bristles_m: Vector6<f64>,
     /// r: force (N) and moment (N m) on the platform, base axes.
     residual: Vector6<f64>,
-    /// The vertical force behind the same low-pass once more, N: as late behind the estimate as the estimate behind the
-    /// force.
+    /// The vertical force behind another low-pass, N: as late behind the estimate as the estimate behind the force.
     late_n: f64,
     uncertainty_n: f64,
 }
@@ -354,13 +369,7 @@ impl ForceObserver {
         self.last = Some(Interval { cycle, pose: *pose, driven: Some(driven) });
         if let Some(before) = last.driven {
             let weight_n = self.observe(&motion, &before, &driven);
-            let loads_n = [&braking.coulomb_n, &braking.screw_n];
-            self.calibration.take_sample(
-                &motion.jacobian.actuators,
-                &self.residual,
-                &motion.rates_m_s,
-                loads_n,
-            );
+            self.calibration.take_sample(&self.residual, &braking.loaded(&motion));
             // A doubt stays in the estimate as long as a force does.
             let now_n = self.bite_uncertainty_n(&motion, &braking, weight_n);
             let before_n = if self.uncertainty_n.is_finite() { self.uncertainty_n } else { now_n };
@@ -391,7 +400,9 @@ impl ForceObserver {
         let acting = (before.wrench + driven.wrench) / 2.0 - bias;
         let share = self.share();
         self.residual += (gained - acting - self.residual) * share;
-        self.late_n += (self.residual[2] - self.late_n) * share;
+        // The estimate is late by the low-pass and a period.
+        let late_s = self.config.observer_time_s + self.period_s;
+        self.late_n += (self.residual[2] - self.late_n) * self.period_s / (self.period_s + late_s);
         bias[2]
     }
 
@@ -401,37 +412,46 @@ impl ForceObserver {
         let Self { config, model: Model { friction, .. }, step_n, .. } = self;
         let vertical = motion.jacobian.actuators.column(2).abs();
         let losses = Vector6::from_fn(|axis, _| friction.screw_doubt(axis, config.screw_uncertainty));
-        let loads_n = [&braking.coulomb_n, &braking.screw_n];
-        let calibrated = self.calibration.doubts_n(&motion.rates_m_s, loads_n);
-        let of_friction = if let Some([left_n, loaded_n]) = calibrated {
-            [vertical.dot(&left_n), vertical.dot(&loaded_n.component_mul(&losses)), 0.0, 0.0, 0.0, 0.0]
+        let breakaway = friction.breakaway_ratio() + config.breakaway_uncertainty;
+        let calibrated = self.calibration.doubts_n(&braking.loaded(motion), &losses, breakaway);
+        let (left_n, bounds_n) = if let Some([left_n, lost_n]) = calibrated {
+            (left_n, lost_n)
         } else {
             let speeds_m_s = motion.rates_m_s.abs();
-            let unloaded_n = Vector6::from(friction.coulomb_n(&Loads::default()));
+            let unloaded_n = Vector6::from(friction.coulomb_n(&Loads::default())).component_mul(&vertical);
+            let coulomb_n = braking.coulomb_n.component_mul(&vertical);
             let share = config.friction_uncertainty;
-            [
-                vertical.dot(&self.law_doubt_n(&speeds_m_s, &braking.coulomb_n)),
+            let bounds_n = [
+                self.held_doubt_n(&speeds_m_s, &coulomb_n, &unloaded_n),
+                (breakaway - 1.0) * coulomb_n.dot(&speeds_m_s.map(|speed_m_s| self.breaking(speed_m_s))),
                 vertical.dot(&braking.screw_n.component_mul(&losses)),
-                share * vertical.dot(&unloaded_n),
+                share * unloaded_n.sum(),
                 share * friction.viscous_n_s_per_m() * vertical.dot(&speeds_m_s),
                 share * braking.joints[2],
                 config.mass_uncertainty * weight_n,
-            ]
+            ];
+            (0.0, SVector::from(bounds_n).norm())
         };
         let rounding_n = vertical.component_mul(step_n).norm() * ROUNDING_VARIANCE.sqrt();
         let late_n = self.residual[2] - self.late_n;
-        SVector::from(of_friction).norm().hypot(late_n).hypot(2.0 * rounding_n)
+        (OF_BOUND * bounds_n).hypot(left_n).hypot(late_n).hypot(COVERAGE * rounding_n)
     }
 
-    /// By how much the friction of axes with these speeds (m/s) may differ where another law holds, N: an axis near rest may
-    /// be held in either direction, and breaks away from a larger force.
-    fn law_doubt_n(&self, speeds_m_s: &Vector6<f64>, coulomb_n: &Vector6<f64>) -> Vector6<f64> {
-        let friction = &self.model.friction;
-        let excess = friction.breakaway_ratio() - 1.0 + self.config.breakaway_uncertainty;
-        coulomb_n.zip_map(speeds_m_s, |coulomb_n, speed_m_s| {
-            let breaking = (-(speed_m_s / friction.breakaway_speed_m_s()).powi(2)).exp();
-            coulomb_n * (self.calibration.rest(speed_m_s) + excess) * breaking
-        })
+    /// By how much the friction of axes at rest may differ where another law holds, which holds them in either direction, N.
+    /// What friction has without load holds each axis by its own history, so squares add; the load is the same for all.
+    fn held_doubt_n(
+        &self,
+        speeds_m_s: &Vector6<f64>,
+        coulomb_n: &Vector6<f64>,
+        unloaded_n: &Vector6<f64>,
+    ) -> f64 {
+        let rests = speeds_m_s.map(|speed_m_s| self.calibration.rest(speed_m_s));
+        rests.component_mul(unloaded_n).norm() + rests.dot(&(coulomb_n - unloaded_n))
+    }
+
+    /// How much an axis of this speed may have breakaway friction, whose speed may be twice the model's, 0 to 1.
+    fn breaking(&self, speed_m_s: f64) -> f64 {
+        (-(speed_m_s / (2.0 * self.model.friction.breakaway_speed_m_s())).powi(2)).exp()
     }
 }
 

@@ -21,10 +21,14 @@ pub struct BiteEstimateFigures {
     pub error_rms_n: f64,
     /// Median of the error without its sign, N.
     pub error_median_n: f64,
+    /// 95 % of the cycles have a smaller error, N: a constant uncertainty of this size would cover them.
+    pub error_95_n: f64,
     /// Median of the stated uncertainty, N.
     pub uncertainty_median_n: f64,
-    /// Share of the cycles in which the uncertainty is at least the error.
+    /// Share of the cycles with an estimate in which the uncertainty is at least the error.
     pub covered: f64,
+    /// Share of the cycles of the motion without an estimate, as during a calibration.
+    pub missing: f64,
     /// Force of which the estimate has less in 95 % of the cycles in which nothing touches the jaw, N; none without such a
     /// cycle.
     pub phantom_n: Option<f64>,
@@ -38,6 +42,7 @@ pub(super) struct BiteEstimateWatch {
     /// Root of the sum of the squared errors, N: also of huge ones the root is a number.
     root_n: f64,
     covered: u64,
+    missing: u64,
     errors: Histogram<u64>,
     uncertainties: Histogram<u64>,
     phantoms: Histogram<u64>,
@@ -51,16 +56,20 @@ impl BiteEstimateWatch {
         let histogram = || Histogram::new(DIGITS).expect("three digits are allowed");
         let [errors, uncertainties, phantoms] = std::array::from_fn(|_| histogram());
         let places = [estimate, uncertainty];
-        Some(Self { places, root_n: 0.0, covered: 0, errors, uncertainties, phantoms })
+        Some(Self { places, root_n: 0.0, covered: 0, missing: 0, errors, uncertainties, phantoms })
     }
 
-    /// Takes a cycle of the motion that has estimate and truth.
+    /// Takes a cycle of the motion with the truth; others have no error.
     pub(super) fn add(&mut self, messages: &CycleMessages) {
-        let (Some(truth), Some(signals)) = (&messages.truth, &messages.signals) else { return };
-        let values = self.places.map(|place| signals.signals.as_slice().get(place).copied());
-        let [Some(estimate_n), Some(uncertainty_n)] = values else { return };
+        let Some(truth) = messages.truth.as_ref().filter(|_| is_running(messages.controller_state)) else {
+            return;
+        };
+        let signals = messages.signals.as_ref().map_or(&[][..], |signals| signals.signals.as_slice());
+        let [estimate_n, uncertainty_n] =
+            self.places.map(|place| signals.get(place).copied().unwrap_or(f64::NAN));
         let error_n = (estimate_n - truth.bite_force_n).abs();
-        if !is_running(messages.controller_state) || !(error_n + uncertainty_n).is_finite() {
+        if !(error_n + uncertainty_n).is_finite() {
+            self.missing += 1;
             return;
         }
         let record = |histogram: &mut Histogram<u64>, value_n: f64| {
@@ -85,8 +94,10 @@ impl BiteEstimateWatch {
         (count > 0).then(|| BiteEstimateFigures {
             error_rms_n: self.root_n / (count as f64).sqrt(),
             error_median_n: at(&self.errors, 0.5),
+            error_95_n: at(&self.errors, 0.95),
             uncertainty_median_n: at(&self.uncertainties, 0.5),
             covered: self.covered as f64 / count as f64,
+            missing: self.missing as f64 / (count + self.missing) as f64,
             phantom_n: (!self.phantoms.is_empty()).then(|| at(&self.phantoms, 0.95)),
         })
     }
@@ -101,7 +112,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn figures_are_those_of_the_motion_and_phantoms_those_without_contact() {
+    fn figures_are_those_of_the_motion_and_a_cycle_without_an_estimate_is_missing() {
         let signal =
             |name: &str| Signal { name: name.to_owned(), unit: "N".to_owned(), about: String::new() };
         let declared = Declared { signals: SIGNALS.map(signal).to_vec(), ..Declared::default() };
@@ -125,6 +136,8 @@ mod tests {
         let figures = watch.into_figures().unwrap();
         assert!((figures.error_rms_n - 3.5f64.sqrt()).abs() < 1e-9, "{figures:?}");
         assert!((figures.covered - 0.75).abs() < 1e-9, "{figures:?}");
+        assert!((figures.missing - 0.2).abs() < 1e-9, "{figures:?}");
+        assert!((figures.error_95_n - 3.0).abs() < 0.01, "{figures:?}");
         assert!((figures.uncertainty_median_n - 2.0).abs() < 0.01, "{figures:?}");
         assert!(figures.phantom_n.is_some_and(|most_n| (most_n - 3.0).abs() < 0.01), "{figures:?}");
     }

@@ -44,11 +44,17 @@ pub(crate) const COLUMNS: [&[ResultColumn]; 3] = [
         ("bite_error_median_n", "N", "its median, without its sign", |all| {
             numbers(all, |case| case.bite_estimate.map(|of| of.error_median_n))
         }),
+        ("bite_error_95_n", "N", "error that 95 % of its cycles are below", |all| {
+            numbers(all, |case| case.bite_estimate.map(|of| of.error_95_n))
+        }),
         ("bite_uncertainty_median_n", "N", "median of the stated uncertainty", |all| {
             numbers(all, |case| case.bite_estimate.map(|of| of.uncertainty_median_n))
         }),
         ("bite_covered", "", "share of the cycles in which the uncertainty is at least the error", |all| {
             numbers(all, |case| case.bite_estimate.map(|of| of.covered))
+        }),
+        ("bite_missing", "", "share of the cycles of the motion without an estimate", |all| {
+            numbers(all, |case| case.bite_estimate.map(|of| of.missing))
         }),
         ("bite_phantom_n", "N", "estimate that 95 % of the cycles without contact are below", |all| {
             numbers(all, |case| case.bite_estimate.and_then(|of| of.phantom_n))
