@@ -352,16 +352,18 @@ fn way_to_rest(option: (u16, i16), stop: fn(&mut Master)) -> (Master, i32) {
 #[test]
 fn it_stops_the_axis_quickly_or_by_halt_and_finds_a_fault_at_rest_as_the_options_say() {
     let quick = |master: &mut Master| master.write(0x6040, 0, Value::Unsigned16(0x02)).unwrap();
-    for (option, state) in [(2, 0x40), (6, 0x07)] {
+    for (option, mask, state) in [(2, 0x4F, 0x40), (6, 0x6F, 0x07)] {
         let (mut master, _) = way_to_rest((0x605A, option), quick);
-        assert!(master.has_state(0x4F, state), "605Ah = {option}");
+        assert!(master.has_state(mask, state), "605Ah = {option}");
     }
     let halt = |master: &mut Master| master.write(0x6040, 0, Value::Unsigned16(0x10F)).unwrap();
     let fail = |master: &mut Master| master.stand.drive(0).set_fault(DriveFault::Fault, Some(1.0));
     let ways = |object, stop| [1, 2].map(|option| way_to_rest((object, option), stop));
-    for (object, stopped, state) in [(0x605D, ways(0x605D, halt), 0x07), (0x605E, ways(0x605E, fail), 0x08)] {
+    for (object, stopped, mask, state) in
+        [(0x605D, ways(0x605D, halt), 0x6F, 0x27), (0x605E, ways(0x605E, fail), 0x4F, 0x08)]
+    {
         let [(mut slow, slow_way), (mut quick, quick_way)] = stopped;
-        assert!(slow.has_state(0x4F, state) && quick.has_state(0x4F, state), "{object:X}h");
+        assert!(slow.has_state(mask, state) && quick.has_state(mask, state), "{object:X}h");
         assert!(slow_way > 2 * quick_way, "{object:X}h: {slow_way} and {quick_way} increments");
     }
 }

@@ -120,7 +120,11 @@ fn read_line(line: &str) -> Result<(&str, Tapped), LineError> {
     let time_ns = read_time(time).ok_or_else(|| LineError::Time(time.to_owned()))?;
     let no_frame = || LineError::Frame(frame.to_owned());
     // `candump -8` adds the length code above 8.
-    let data = data.split_once('_').map_or(data, |(data, _)| data);
+    let data = match data.split_once('_') {
+        None => data,
+        Some((data, code)) if data.len() == 16 && code.len() == 1 && read_hex(code).is_some() => data,
+        Some(_) => return Err(no_frame()),
+    };
     let data = read_data(data).ok_or_else(no_frame)?;
     let number = read_hex(id).ok_or_else(no_frame)?;
     if number & ERROR_FLAG != 0 {

@@ -77,7 +77,7 @@ impl Line {
 /// [`send`](Bus::send) compares a frame with the party's next line of the same identifier; frames of different
 /// identifiers may change their order, as they do on a wire. [`receive`](Bus::receive) gives the next frame of others,
 /// once all of the party's lines before it are sent, and not before its time. So every answer follows its request,
-/// however fast or slowly the party runs. A party without a clock takes `u64::MAX` for all times.
+/// however fast or slowly the party runs. A party without a clock takes `u64::MAX` for all times, and sets no window.
 ///
 /// After the first [`Difference`] the replay is over: nothing is compared or received. What the party sends after its
 /// last line is not judged, so that a log may be cut anywhere.

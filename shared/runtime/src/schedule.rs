@@ -2,9 +2,9 @@
 //!
 //! SYNC and the drives' process data (TPDO1) go first, at offset 0. Then the controller computes. Then its targets
 //! (RPDO1) go out, before the next SYNC. The heartbeat is the last message of a node in its cycle. A drive's heartbeat
-//! follows its TPDO1; the master's heartbeat follows the RPDO1 and any SDO request. So the offsets also hold for
-//! interfaces that send in the order of their queue, while SYNC waits for one heartbeat at most: [`queued`] has the bounds
-//! for heartbeats that meet, and for emergencies (EMCY). An SDO exchange takes the place of its drive's process data.
+//! follows its TPDO1; the master's heartbeat follows the RPDO1 and any SDO request. The offsets also hold for
+//! interfaces that send in the order of their queue, if SYNC waits for one heartbeat at most. [`queued`] has the bounds for
+//! heartbeats that meet, and for emergencies (EMCY). An SDO exchange takes the place of its drive's process data.
 //! Emergencies are not in the schedule: in a cycle with an emergency, reading or command may be late, as with a disturbed
 //! bus.
 

@@ -79,6 +79,10 @@ impl<'a> Replay<'a> {
             let command = self.command(cycle);
             self.master.apply(sync_ns + schedule.controller_at_ns, command.as_ref(), &mut self.wires);
             self.master.drain_events(&mut |event| self.events.push(event));
+            // Without its SYNC the replay goes no further.
+            if self.wires.next_sync_ns() == Some(sync_ns) {
+                break;
+            }
         }
         self.master.collect(u64::MAX, &mut self.wires);
         self.master.drain_events(&mut |event| self.events.push(event));

@@ -1,5 +1,6 @@
 """Emulated CiA 402 servo drives as a bus of python-can. The README of the package is the guide."""
 
+import contextlib
 import io
 import itertools
 import json
@@ -267,13 +268,18 @@ class Drives(can.BusABC):
     def serve(self, other: can.BusABC) -> None:
         """Joins another bus of python-can to the wire, until this bus closes: masters there find the drives.
 
-        An error of the other bus is logged, and each later call of this bus raises BridgeError.
+        An error of the other bus is logged, and each later call of this bus but shutdown raises BridgeError. Join a wire to a channel
+        once: over a second bus of one channel each frame would come back.
         """
         world = self._open()
         if not world.is_real:
             raise SettingError("clock", "simulated", "another bus has real time; make the drives with clock='real'")
         if isinstance(other, Drives) and other._world is world:
             raise SettingError("other", other.channel_info, "this bus is on the wire of the drives already")
+        if isinstance(other, Drives) and not other._world.is_real:
+            raise SettingError("other", other.channel_info, "its time is simulated; make its drives with clock='real'")
+        if Bridge.is_on(other):
+            raise SettingError("other", other.channel_info, "a wire of drives is joined to this bus already")
         self._bridges.append(Bridge(Drives(self.channel), other))
 
     def send(self, msg: can.Message, timeout: float | None = None) -> None:
@@ -333,10 +339,12 @@ class Drives(can.BusABC):
         """Closes the bus; the one that made the drives switches them off."""
         if self._is_shutdown:
             return
-        for network in self._networks:
-            network.disconnect()
-        for bridge in self._bridges:
-            bridge.close()
+        with contextlib.ExitStack() as ends:
+            ends.callback(self._leave)
+            for end in [bridge.close for bridge in self._bridges] + [network.disconnect for network in self._networks]:
+                ends.callback(end)
+
+    def _leave(self) -> None:
         super().shutdown()
         if self._world.is_open and self._world.pid == os.getpid():
             self._note(self._world.bench.leave(self._bus))

@@ -2,6 +2,7 @@
 
 import logging
 import threading
+import weakref
 
 import can
 
@@ -12,18 +13,28 @@ _LOG = logging.getLogger("can.masseter_drives")
 _LOOK_S = 0.1
 #: How long a frame may wait for room on the bus that takes the frame.
 _ROOM_S = 1.0
+#: The buses that bridges are on.
+_joined: weakref.WeakSet[can.BusABC] = weakref.WeakSet()
 
 
 class Bridge:
     """Carries classical data frames both ways, by a thread for each direction. The first error of a bus ends both."""
 
     def __init__(self, own: can.BusABC, other: can.BusABC) -> None:
-        self._own, self._about = own, f"{own.channel_info}, bridge to {other.channel_info}"
-        self._is_open, self._error = True, None  # type: tuple[bool, Exception | None]
+        self._own, self._other = own, other
+        self._about = f"{own.channel_info}, bridge to {other.channel_info}"
+        self._is_open = True
+        self._error: Exception | None = None
+        _joined.add(other)
         ways = [(own, other), (other, own)]
         self._threads = [threading.Thread(target=self._carry, args=way, name=self._about, daemon=True) for way in ways]
         for thread in self._threads:
             thread.start()
+
+    @staticmethod
+    def is_on(bus: can.BusABC) -> bool:
+        """Whether a bridge carries the frames of a bus already."""
+        return bus in _joined
 
     def _carry(self, source: can.BusABC, sink: can.BusABC) -> None:
         try:
@@ -46,8 +57,9 @@ class Bridge:
             raise BridgeError(f"{self._about} ended: {self._error}") from self._error
 
     def close(self) -> None:
-        """Ends both threads. The other bus stays open."""
+        """Ends both threads. The other bus stays open. A thread is left behind whose frame the other bus does not take."""
         self._is_open = False
         for thread in self._threads:
-            thread.join()
+            thread.join(2 * _ROOM_S)
+        _joined.discard(self._other)
         self._own.shutdown()

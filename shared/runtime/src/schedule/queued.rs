@@ -1,8 +1,8 @@
 //! The latest arrivals on a scenario's buses by the queue of the master's interface, with emergencies and SDO.
 //!
 //! The master queues SYNC at the begin of a cycle. RPDO1, an SDO request and the heartbeat follow in this order, at the latest
-//! when the command is due. Drives send by priority. An SDO server answers once a cycle at most, and a drive has at most one
-//! emergency in [`EMERGENCIES_APART_NS`]. NMT is in no plan. Runs are accepted by [`plans`](super::plans()) alone.
+//! when the command is due. Drives send by priority. Two assumptions have no enforcement: answers of an SDO server
+//! are at least a cycle apart, and emergencies of a drive [`EMERGENCIES_APART_NS`]. The plan has no NMT, and one booting drive at most. Runs are accepted by [`plans`](super::plans()) alone.
 
 use std::collections::BTreeMap;
 use std::fmt;

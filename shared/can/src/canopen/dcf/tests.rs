@@ -177,7 +177,7 @@ fn ten_megabytes_that_describe_more_than_fits_into_memory_are_refused_with_their
     {
         let error = Dcf::parse(&text).unwrap_err();
         assert!(
-            error.problem.ends_with("at most 4096 are possible, so shorten the line"),
+            error.problem.ends_with("at most 65536 are possible, so shorten the line"),
             "line {}",
             error.line
         );

@@ -6,8 +6,8 @@ use std::fmt::{self, Display, Formatter};
 
 use crate::canopen::NodeId;
 
-/// The longest line, bytes. CiA 306 has 255 characters, and longer ones occur.
-const LONGEST_LINE: usize = 4096;
+/// The longest line, bytes. CiA 306 has 255 characters; values of type DOMAIN are longer.
+const LONGEST_LINE: usize = 1 << 16;
 
 /// A section and its keys. Names match without regard to case.
 #[derive(Debug)]
