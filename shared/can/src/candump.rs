@@ -241,6 +241,8 @@ mod tests {
             ("(1.0) can0 123##111", "no data frame"),
             ("(1.0) can0 123#1", "no data frame"),
             ("(1.0) can0 123#+1", "no data frame"),
+            ("(1.0) can0 123#AB_9", "no data frame"),
+            ("(1.0) can0 123#ABABABABABABABAB_zz", "no data frame"),
             ("(1.0) can0 1234#11", "no data frame"),
             ("(1.0) can0 1é3#é1", "no data frame"),
             ("(1.0) can0 20000240#11", "no data frame"),
