@@ -27,7 +27,7 @@ pub mod wanted;
 #[cfg(test)]
 mod tests;
 
-use masseter_can::canopen::{Cob, Heartbeat, NmtState, sync};
+use masseter_can::canopen::{Cob, EmergencyCode, Heartbeat, NmtState, sync};
 use masseter_can::{Bus, FULL_QUEUE, Frame, ReceiveError, Received, SendError, wire::worst_case_bits};
 use masseter_model::geometry::AXES;
 use masseter_runtime::messages::codes::{
@@ -418,7 +418,13 @@ impl Master {
                 // such a drive.
                 let is_past = emergency.is_reset() || drive.boot.phase == BootPhase::Waiting;
                 drive.emergency = emergency.code;
+                let has_lost_master = emergency.code == EmergencyCode::HEARTBEAT && drive.is_ready();
                 self.events.add(time_ns, Subject::Axis(axis), events::emergency(emergency, is_past));
+                // Such a drive stops by itself and mostly leaves the process data, so no statusword shows the stop.
+                if has_lost_master {
+                    let failure = Failure::with(Cause::Emergency, emergency.code.0, emergency.register);
+                    self.fail(time_ns, Subject::Axis(axis), &failure);
+                }
             }
             Ok(Message::SdoAnswer(answer)) => {
                 let result = drive.take_sdo_answer(time_ns, answer);

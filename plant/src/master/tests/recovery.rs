@@ -147,6 +147,20 @@ fn emergencies_come_with_code_and_register_and_go() {
     assert_eq!((told[1].kind, told[1].value, told[1].axis), (EventKind::Notice.code(), 0.0, 3));
 }
 
+/// Its process data would be missing only some cycles later, in which the others move on.
+#[test]
+fn a_drive_that_has_lost_the_master_stops_the_others_by_its_emergency() {
+    let mut bench = Bench::enabled();
+    let (now_ns, id) = (bench.now_ns(), bench.drive(3).id);
+    let silent = Emergency { code: EmergencyCode::HEARTBEAT, register: 0x11, vendor: [0; 5] };
+    bench.wires.wire(1).arrive(now_ns, silent.frame(id));
+    bench.cycle(Some(DriveRequest::Enable));
+    assert_eq!(bench.reading.master_fault, 1);
+    let stop = bench.events_of(EventKind::Fault).last().unwrap();
+    assert_eq!((stop.source, stop.cause), (Source::Master.code(), Cause::Emergency.code()));
+    assert_eq!((stop.axis, stop.value, stop.limit), (3, f64::from(0x8130), 17.0));
+}
+
 /// A drive that missed the heartbeat of an earlier rig may report the loss only now.
 #[test]
 fn an_emergency_before_the_boot_up_is_no_fault_of_this_rig() {
