@@ -1,7 +1,7 @@
-//! The model against itself, the observer on a swinging platform, and feed-forward along simple ways.
+//! The observer on a swinging platform.
 
-use masseter_model::geometry::{LEGS, MechanismConfig, Vec3};
-use masseter_scenario::{DynamicsConfig, FrictionModel};
+use masseter_model::geometry::{Mechanism, MechanismConfig, Vec3};
+use masseter_scenario::DynamicsConfig;
 use nalgebra::UnitQuaternion;
 
 use super::*;
@@ -140,92 +140,5 @@ fn a_gap_in_the_readings_begins_anew_without_a_jump() {
         let time_s = cycle as f64 * PERIOD_S;
         observer.take_sample(cycle, &pose(time_s), &force_n(&truth, time_s, &Vector6::zeros()));
         assert!(observer.residual[2].abs() < 1.0 || cycle < 5, "cycle {cycle}: {}", observer.residual[2]);
-    }
-}
-
-fn offset_n(
-    dynamics: &DynamicsConfig,
-    velocity_m_s: f64,
-    acceleration_m_s2: f64,
-    detour: &Detour,
-) -> [f64; AXES] {
-    let scenario = Scenario { dynamics: *dynamics, ..Scenario::default() };
-    let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
-    let mut feed = FeedForward { share: 1.0, ..FeedForward::new(Model::new(&scenario, mechanism), PERIOD_S) };
-    let at = |time_s: f64| {
-        let way_m = velocity_m_s * time_s + acceleration_m_s2 * time_s * time_s / 2.0;
-        Pose::translation(0.0, 0.0, 0.268_452_355 + way_m)
-    };
-    feed.offset_n([at(-PERIOD_S), at(0.0), at(PERIOD_S)], detour)
-}
-
-fn legs_n(forces_n: [f64; AXES]) -> f64 {
-    forces_n[LEGS..].iter().sum()
-}
-
-#[test]
-fn at_rest_the_legs_carry_the_weight_of_platform_and_rods() {
-    let still = offset_n(&DynamicsConfig::default(), 0.0, 0.0, &Detour::default());
-    let weight_n = (0.5 + 3.0 * 0.4) * 9.81;
-    assert!((legs_n(still) - weight_n).abs() < 0.3, "{still:?}");
-    assert!(still[..LEGS].iter().all(|slide_n| slide_n.abs() < 0.5), "{still:?}");
-}
-
-#[test]
-fn friction_changes_its_sign_with_the_motion_and_mass_adds_with_the_acceleration() {
-    let mut frictionless = DynamicsConfig::default();
-    frictionless.friction.model = FrictionModel::None;
-    let none = Detour::default();
-    let [up, down] =
-        [0.05, -0.05].map(|speed| legs_n(offset_n(&DynamicsConfig::default(), speed, 0.0, &none)));
-    // Each leg: 1.25 N and 20 N s/m · 50 mm/s, in both directions; and the screws lose a ninth of the weight.
-    let screws_n = 2.0 * (0.5 + 3.0 * 0.4) * 9.81 / 9.0;
-    assert!((up - down - 13.5 - screws_n).abs() < 0.2, "{up} {down}");
-    let [still, gains] = [0.0, 2.0].map(|gain| legs_n(offset_n(&frictionless, 0.0, gain, &none)));
-    assert!((gains - still - 2.0 * 1.7).abs() < 0.2, "{still} {gains}");
-}
-
-#[test]
-fn the_forces_fade_in_after_a_beginning() {
-    let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
-    let mut feed = FeedForward::new(Model::new(&Scenario::default(), mechanism), PERIOD_S);
-    let mut weight_n = || legs_n(feed.offset_n([Pose::translation(0.0, 0.0, 0.27); 3], &Detour::default()));
-    let first_n = weight_n();
-    let most_n = (0..400).map(|_| weight_n()).fold(0.0, f64::max);
-    assert!(first_n < 0.1 && (most_n - 1.7 * 9.81).abs() < 0.3, "{first_n} {most_n}");
-    feed.begin();
-    assert!(feed.share <= 0.0);
-}
-
-#[test]
-fn a_law_that_holds_the_platform_back_takes_the_friction_back() {
-    let held = Detour { ahead_m_s: Vec3::new(0.0, 0.0, -0.05), ..Detour::default() };
-    let [still, held] = [(0.0, Detour::default()), (0.05, held)]
-        .map(|(speed, detour)| legs_n(offset_n(&DynamicsConfig::default(), speed, 0.0, &detour)));
-    assert!((still - held).abs() < 1e-6, "{still} {held}");
-}
-
-#[test]
-fn friction_is_found_in_the_forces_of_the_drives_whatever_the_screws_lose() {
-    let wrench = Vector6::z() * -40.0;
-    // A self-locking screw hides a driving load.
-    for (leg_screw_efficiency, speeds_m_s) in
-        [(0.9, [0.05, -0.05]), (0.8, [0.05, -0.05]), (0.3, [0.05, 0.02])]
-    {
-        let mut scenario = Scenario::default();
-        scenario.dynamics.friction.leg_screw_efficiency = leg_screw_efficiency;
-        let model = Model::new(&scenario, Mechanism::new(&MechanismConfig::default()).unwrap());
-        for speed_m_s in speeds_m_s {
-            let twist = Vector6::z() * speed_m_s;
-            let motion = model.motion(&Pose::translation(0.0, 0.0, 0.268), &twist).unwrap();
-            let driven_n = model.force_n(&motion, &Twist::zeros(), &wrench).unwrap();
-            let braking = model.braking(&motion, &driven_n, None);
-            let found = motion.jacobian.actuators.tr_mul(&(driven_n - braking.axes_n)) + braking.joints;
-            let needed = Equations::new(&model.bodies, &motion).bias - wrench;
-            assert!(
-                (found - needed).amax() < 0.5,
-                "{leg_screw_efficiency} at {speed_m_s} m/s: {found} {needed}"
-            );
-        }
     }
 }
