@@ -73,6 +73,28 @@ leg_screw_efficiency = 0.9
 slide_screw_efficiency = 0.9
 ";
 
+/// Screws of 0.8 under a model of 0.9, and a cell that shows 4 N without load.
+#[test]
+fn a_load_cell_makes_the_estimate_as_certain_as_the_cell_within_its_range() {
+    let figures = |keys: &str, range_n: u32| {
+        let workspace = Workspace::new(&format!(
+            "duration_s = 3.2\n[force_estimate]\ncalibration_s = 2.0\n{keys}\n[load_cell]\noffset_n = 4.0\nrange_n = \
+             {range_n}.0\n[dynamics.friction]\nleg_screw_efficiency = 0.8\n[controller.model.friction]\n\
+             leg_screw_efficiency = 0.9\n[[stimulus]]\nname = 'bite'\nat_s = 1.2\nfood = {{ kind = 'soft' }}"
+        ));
+        let output = workspace.run_virtual(&[]);
+        assert_eq!(output.status.code(), Some(0), "{}{}", stdout(&output), stderr(&output));
+        let estimate = &workspace.summary()["figures"]["bite_estimate"];
+        ["error_rms_n", "uncertainty_median_n", "covered"].map(|figure| estimate[figure].as_f64().unwrap())
+    };
+    let fused = "fusion = 'load_cell'";
+    let [drives, cell, narrow] = [("", 100), (fused, 100), (fused, 12)].map(|(keys, n)| figures(keys, n));
+    // Noise of 0.1 N rms.
+    assert!(cell[0] < 0.2 && cell[1] < 0.3 && cell[2] > 0.93, "{cell:?}");
+    // The bite leaves the range of the narrow cell, and the drives alone know it there.
+    assert!(drives[0] > 1.0 && narrow[0] > 1.0 && narrow[2] > drives[2] - 0.03, "{drives:?} {narrow:?}");
+}
+
 #[test]
 fn the_stated_uncertainty_covers_robots_with_another_friction_than_the_model() {
     let more = "slide_friction_n = 6.5\nviscous_friction_n_s_per_m = 26.0";

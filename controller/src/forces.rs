@@ -13,6 +13,7 @@ use crate::pose_law::{ExternalForce, PoseLaw};
 use crate::{safety::Fault, sequencer::Sequencer};
 
 mod calibration;
+mod cell;
 mod feed_forward;
 mod model;
 mod observer;
@@ -55,6 +56,7 @@ impl Forces {
             match (reading, sequencer.fresh_estimate()) {
                 _ if !sequencer.is_moving() => observer.reset(),
                 (Some(reading), Some(estimate)) => {
+                    observer.take_cell(reading.load_cell_n);
                     observer.take_sample(reading.cycle, &estimate.solution.pose, &reading.force_n);
                 }
                 _ => {}
@@ -71,7 +73,8 @@ impl Forces {
     }
 
     /// Refuses a bite force above the limit of the force control, or one that is no number, whatever law controls the force.
-    /// During a calibration the rough force counts: a limit has no time without a force.
+    /// During a calibration the rough force counts: a limit has no time without a force. A cell that hides a force takes no part
+    /// in a limit of the estimate.
     pub(crate) fn check_bite(&self) -> Result<(), Fault> {
         let Some(control) = &self.control else { return Ok(()) };
         let bite_n = match control.source {

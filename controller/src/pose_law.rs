@@ -52,7 +52,7 @@ pub struct ExternalForce {
     pub force_n: [f64; 3],
     /// Moment about the platform's origin, N m.
     pub moment_nm: [f64; 3],
-    /// Bound of the error of the bite force, N.
+    /// Uncertainty of the bite force, two standard deviations, N.
     pub uncertainty_n: f64,
 }
 

@@ -13,7 +13,9 @@ use masseter_model::geometry::{AXES, Actuators, LEGS, Mechanism, MechanismConfig
 use masseter_runtime::control::{Controller, Tick};
 use masseter_runtime::messages::codes::{ControllerState, DriveRequest, DriveState};
 use masseter_runtime::messages::{Command, Reading, State};
-use masseter_scenario::{ControllerConfig, ForceControlConfig, Scenario};
+use masseter_scenario::{
+    ControllerConfig, ForceControlConfig, ForceEstimateConfig, ForceFusion, LoadCellConfig, Scenario,
+};
 
 struct Counting;
 
@@ -60,6 +62,14 @@ fn no_cycle_with_feed_forward_and_force_control_allocates() {
     check_cycles(&Scenario { duration_s: Some(0.5), controller, force_control, ..Scenario::default() });
 }
 
+#[test]
+fn no_cycle_with_a_load_cell_in_the_estimate_allocates() {
+    let fused =
+        ForceEstimateConfig { calibration_s: 0.1, fusion: ForceFusion::LoadCell, ..Default::default() };
+    let (force_estimate, load_cell) = (Some(fused), Some(LoadCellConfig::default()));
+    check_cycles(&Scenario { duration_s: Some(0.5), force_estimate, load_cell, ..Scenario::default() });
+}
+
 fn check_cycles(scenario: &Scenario) {
     let mechanism = Mechanism::new(&scenario.mechanism).unwrap();
     let trajectory =
@@ -76,6 +86,7 @@ fn check_cycles(scenario: &Scenario) {
                 cycle,
                 answers_cycle: cycle - 1,
                 force_n: [0.0, 0.0, 0.0, 20.0, 20.0, 20.0],
+                load_cell_n: if cycle.is_multiple_of(2) { 0.1 } else { -0.1 },
                 position_m: if is_driven { command.target_m } else { start },
                 drive_state: [DriveState::OperationEnabled.code(); AXES],
                 fresh_axes: (1 << AXES) - 1,

@@ -2,10 +2,11 @@
 
 use masseter_model::dynamics::{Equations, FrictionModel, Loads, Motion};
 use masseter_model::geometry::{AXES, Pose, Twist};
-use masseter_scenario::{ForceEstimateConfig, Scenario};
+use masseter_scenario::{ForceEstimateConfig, ForceFusion, Scenario};
 use nalgebra::{SVector, Vector6};
 
 use super::calibration::Calibration;
+use super::cell::{COVERAGE, Cell, Known};
 use super::model::{Braking, Model, twist_between};
 use crate::pose_law::ExternalForce;
 
@@ -13,8 +14,6 @@ use crate::pose_law::ExternalForce;
 const STEPS: f64 = 1000.0;
 /// Variance of a value within a step of 1: 1/12.
 const ROUNDING_VARIANCE: f64 = 1.0 / 12.0;
-/// Uncertainties are this many standard deviations.
-const COVERAGE: f64 = 2.0;
 /// Uncertainty of a value that is anywhere within a bound of 1: its standard deviation is 1/√3.
 const OF_BOUND: f64 = COVERAGE * 0.577_350_269_189_625_8;
 
@@ -55,6 +54,8 @@ pub(super) struct ForceObserver {
     step_n: Vector6<f64>,
     last: Option<Interval>,
     calibration: Calibration,
+    /// None without fusion with the load cell.
+    cell: Option<Cell>,
     /// `lugre`: deflections of the axes' bristles, m.
     bristles_m: Vector6<f64>,
     /// r: force (N) and moment (N m) on the platform, base axes.
@@ -86,11 +87,13 @@ impl ForceObserver {
     pub(super) fn new(scenario: &Scenario, model: Model) -> Self {
         let (config, period_s) = (scenario.force_estimate.unwrap_or_default(), scenario.period_s());
         let samples = (config.calibration_s / period_s).round() as u64;
+        let cell = scenario.load_cell.filter(|_| config.fusion == ForceFusion::LoadCell);
         Self {
             model,
             config,
             period_s,
             calibration: Calibration::new(samples, config.rest_speed_m_s),
+            cell: cell.map(|cell| Cell::new(cell, period_s)),
             step_n: Vector6::from_fn(|axis, _| scenario.drives.of_axis(axis).rated_force_n / STEPS),
             last: None,
             bristles_m: Vector6::zeros(),
@@ -110,16 +113,25 @@ impl ForceObserver {
     pub(super) fn external(&self) -> Option<ExternalForce> {
         let [x, y, z, moment_x, moment_y, moment_z] = self.residual.into();
         let is_known = self.uncertainty_n.is_finite() && self.calibration.is_complete();
+        let observed = Known { bite_n: -z, uncertainty_n: self.uncertainty_n };
+        let known = self.cell.as_ref().map_or(observed, |cell| cell.fused(observed));
         is_known.then_some(ExternalForce {
-            force_n: [x, y, z],
+            force_n: [x, y, -known.bite_n],
             moment_nm: [moment_x, moment_y, moment_z],
-            uncertainty_n: self.uncertainty_n,
+            uncertainty_n: known.uncertainty_n,
         })
     }
 
-    /// The bite force, N, also from a calibration that is not complete; none before two intervals.
+    /// The bite force by the drives alone, N, also from a calibration that is not complete; none before two intervals.
     pub(super) fn rough_bite_n(&self) -> Option<f64> {
         (self.uncertainty_n != f64::INFINITY).then_some(-self.residual[2])
+    }
+
+    /// Takes what the load cell shows in a cycle, N.
+    pub(super) fn take_cell(&mut self, shown_n: f64) {
+        if let Some(cell) = &mut self.cell {
+            cell.take_sample(shown_n, self.calibration.is_complete());
+        }
     }
 
     /// Takes the sample of a cycle: the pose, and the drives' mean forces (N) since the sample before. A gap between

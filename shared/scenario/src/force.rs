@@ -7,6 +7,17 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{Checked, ScenarioError, ranges_of, require, require_range};
 
+/// What the estimate of the drives is fused with.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ForceFusion {
+    /// Nothing: the drives alone.
+    #[default]
+    None,
+    /// The bite force that the load cell shows.
+    LoadCell,
+}
+
 section! {
     /// The estimate of the external force on the platform from the forces of the drives.
     #[derive(Copy)]
@@ -16,6 +27,9 @@ section! {
         /// Time from the first estimate on in which nothing touches the jaw while it moves: friction and weight beside the
         /// model's are identified from this time, and there is no estimate until then. 0: no calibration.
         pub calibration_s: f64 = 0.0 => Within(0.0, 60.0),
+        /// Whether the bite force is fused with that of the load cell, each weighted by its variance; `load_cell` needs
+        /// `[load_cell]` with noise, and a calibration, which tares the cell.
+        pub fusion: ForceFusion = ForceFusion::None,
         /// Share by which Coulomb, viscous and joint friction may differ from the model's. This key and those below are for the
         /// uncertainty, by which the force control judges the stiffness that a bite shows.
         pub friction_uncertainty: f64 = 0.3 => Within(0.0, 10.0),
@@ -29,6 +43,44 @@ section! {
         /// rest in a calibration.
         pub rest_speed_m_s: f64 = 0.002 => Within(0.0, 0.1),
     }
+}
+
+impl ForceEstimateConfig {
+    /// Refuses a fusion without a cell, or with one that it cannot tare or trust.
+    pub(super) fn require_fusible(&self, cell: Option<&LoadCellConfig>, is_emulated: bool) -> Checked {
+        if self.fusion == ForceFusion::None {
+            return Ok(());
+        }
+        let LoadCellConfig { noise_n, offset_n, range_n, .. } =
+            *require_cell("force_estimate.fusion", cell, is_emulated, "none")?;
+        let need = "use a time without contact: the fusion tares the load cell in this time";
+        require(self.calibration_s > 0.0, "force_estimate.calibration_s", &self.calibration_s, need)?;
+        let need = "use the noise of the cell: the fusion weights the cell by it, and without noise a cell that sticks looks sound";
+        require(noise_n > 0.0, "load_cell.noise_n", &noise_n, need)?;
+        let least_range_n = offset_n.abs() + 5.0 * noise_n;
+        let need = format!(
+            "use more than {least_range_n} N, offset and five times the noise: this cell is at an end without a load"
+        );
+        require(range_n > least_range_n, "load_cell.range_n", &range_n, need)
+    }
+}
+
+/// The load cell that the value "load_cell" of a key needs; `instead` is the value without one. Only the emulated jaw has a
+/// load cell.
+fn require_cell<'a>(
+    key: &str,
+    cell: Option<&'a LoadCellConfig>,
+    is_emulated: bool,
+    instead: &str,
+) -> Result<&'a LoadCellConfig, ScenarioError> {
+    cell.ok_or_else(|| {
+        let need = if is_emulated {
+            format!("add the table [load_cell], or use {instead:?}")
+        } else {
+            format!("use {instead:?}: on real interfaces the rig reads no load cell")
+        };
+        ScenarioError::bad(key, &"\"load_cell\"", need)
+    })
 }
 
 /// The course of the desired bite force from the contact on.
@@ -116,19 +168,18 @@ impl ForceControlConfig {
         FRAC_2_PI * stiffness_n_per_m * delay_s
     }
 
-    /// The load cell of the control; none for control by the estimate. Only the emulated jaw has a load cell.
+    /// The load cell of the control; none for control by the estimate.
     pub(super) fn cell<'a>(
         &self,
         cell: Option<&'a LoadCellConfig>,
         is_emulated: bool,
     ) -> Result<Option<&'a LoadCellConfig>, ScenarioError> {
-        let need = match cell {
-            _ if self.source == ForceSource::Estimate => return Ok(None),
-            Some(_) => return Ok(cell),
-            None if is_emulated => "add the table [load_cell], or use \"estimate\"",
-            None => "use \"estimate\": on real interfaces the rig reads no load cell",
-        };
-        Err(ScenarioError::bad("force_control.source", &"\"load_cell\"", need))
+        match self.source {
+            ForceSource::Estimate => Ok(None),
+            ForceSource::LoadCell => {
+                require_cell("force_control.source", cell, is_emulated, "estimate").map(Some)
+            }
+        }
     }
 
     /// Refuses values without use, and a damping below the limit of stability. The delays (s) are the lead and that of

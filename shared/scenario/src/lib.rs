@@ -47,7 +47,9 @@ pub use faults::{
     AxisFault, BusFault, CommandFault, DriveFault, EncoderFault, FaultConfig, FaultDeclaration,
     FaultKindConfig, FaultSize, Overlap, PlatformFault, ProcessFault,
 };
-pub use force::{BiteProfile, ForceControlConfig, ForceEstimateConfig, ForceSource, LoadCellConfig};
+pub use force::{
+    BiteProfile, ForceControlConfig, ForceEstimateConfig, ForceFusion, ForceSource, LoadCellConfig,
+};
 pub use jaw::{FoodConfig, JawConfig, MOST_PAIRS, Material, TeethConfig, ToothConfig};
 pub use masseter_model::dynamics::{AxesConfig, DynamicsConfig, FrictionConfig, FrictionModel};
 pub use masseter_model::section::{Key, Range, unit_of};

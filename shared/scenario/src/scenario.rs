@@ -394,6 +394,7 @@ impl Scenario {
             let need = "leave the table away with can.interfaces: the rig reads no load cell there";
             require(self.can.is_virtual(), "load_cell", &"given", need)?;
         }
+        estimate.require_fusible(self.load_cell.as_ref(), self.can.is_virtual())?;
         if let Some(control) = &self.force_control {
             let cell = control.cell(self.load_cell.as_ref(), self.can.is_virtual())?;
             control.validate(self.lead_s(), self.source_s(control))?;

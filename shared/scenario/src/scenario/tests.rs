@@ -175,6 +175,26 @@ const WRONG: &[(&str, &str)] = &[
         "[can]\ninterfaces = ['a', 'b']\n[force_control]\nsource = 'load_cell'",
         "force_control.source = \"load_cell\": use \"estimate\": on real interfaces",
     ),
+    (
+        "[force_estimate]\nfusion = 'load_cell'\ncalibration_s = 1.0",
+        "force_estimate.fusion = \"load_cell\": add the table [load_cell], or use \"none\"",
+    ),
+    (
+        "[can]\ninterfaces = ['a', 'b']\n[force_estimate]\nfusion = 'load_cell'\ncalibration_s = 1.0",
+        "force_estimate.fusion = \"load_cell\": use \"none\": on real interfaces",
+    ),
+    (
+        "[load_cell]\n[force_estimate]\nfusion = 'load_cell'",
+        "force_estimate.calibration_s = 0: use a time without contact",
+    ),
+    (
+        "[load_cell]\nnoise_n = 0.0\n[force_estimate]\nfusion = 'load_cell'\ncalibration_s = 1.0",
+        "load_cell.noise_n = 0: use the noise of the cell",
+    ),
+    (
+        "[load_cell]\noffset_n = -8.0\nrange_n = 8.4\n[force_estimate]\nfusion = 'load_cell'\ncalibration_s = 1.0",
+        "load_cell.range_n = 8.4: use more than 8.5 N",
+    ),
     ("[force_control]\nsource = 'loadcell'", "did you mean 'load_cell'?"),
     (
         "[load_cell]\nbandwidth_hz = 10.0\n[force_control]\nsource = 'load_cell'\ndamping_n_s_per_m = 40.0",
