@@ -11,7 +11,7 @@ import sys
 
 import duckdb
 
-LAW, FOOD = '"dynamics.friction.model"', '"stimulus.bite.food.kind"'
+LAW, FOOD, RANGE = '"dynamics.friction.model"', '"stimulus.bite.food.kind"', '"load_cell.range_n"'
 GROUPS = {
     "all": "true",
     "robots `smooth`": f"{LAW} = 'smooth'",
@@ -20,7 +20,12 @@ GROUPS = {
     "peanut": f"{FOOD} = 'peanut'",
     "gum": f"{FOOD} = 'gum'",
 }
-CALIBRATED = {"without": "= 0", "with": "> 0"}
+ESTIMATES = {
+    "drives": "force_estimate LIKE '%calibration_s = 0.0%'",
+    "calibrated": "force_estimate LIKE '%calibration_s = 2.0%' AND force_estimate NOT LIKE '%load_cell%'",
+    "load cell of 100 N": f"force_estimate LIKE '%load_cell%' AND {RANGE} = 100",
+    "load cell of 1000 N": f"force_estimate LIKE '%load_cell%' AND {RANGE} = 1000",
+}
 # Heading, value and decimals.
 COLUMNS = [
     ("runs", "count(bite_covered)", 0),
@@ -39,14 +44,13 @@ COLUMNS = [
 def main() -> None:
     table, least = pathlib.Path(sys.argv[1], "cases.parquet"), float(sys.argv[2]) if len(sys.argv) > 2 else 0.0
     values = ", ".join(value for _, value, _ in COLUMNS)
-    print("| robots | calibration | " + " | ".join(heading for heading, _, _ in COLUMNS) + " |")
+    print("| robots | estimate | " + " | ".join(heading for heading, _, _ in COLUMNS) + " |")
     print("| --- | --- |" + " ---: |" * len(COLUMNS))
     for name, group in GROUPS.items():
-        for calibration, size in CALIBRATED.items():
-            where = f'{group} AND "force_estimate.calibration_s" {size}'
-            row = duckdb.sql(f"SELECT {values} FROM '{table}' WHERE {where}").fetchall()[0]
+        for estimate, kind in ESTIMATES.items():
+            row = duckdb.sql(f"SELECT {values} FROM '{table}' WHERE {group} AND {kind}").fetchall()[0]
             cells = ["–" if value is None else f"{value:.{decimals}f}" for value, (_, _, decimals) in zip(row, COLUMNS, strict=True)]
-            print(f"| {name} | {calibration} | " + " | ".join(cells) + " |")
+            print(f"| {name} | {estimate} | " + " | ".join(cells) + " |")
     covered, runs = duckdb.sql(f"SELECT avg(bite_covered), count(bite_covered) FROM '{table}'").fetchall()[0]
     if not runs or covered < least:
         sys.exit(f"{table}: {runs} runs with an estimate, whose uncertainty covers {covered}; demanded {least}")
