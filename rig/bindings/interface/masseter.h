@@ -88,7 +88,7 @@ typedef struct masseter_demand {
     double load_cell_n;
     /* Estimated wrench on the platform: N, then N m about its origin, base axes; zeros without an estimate. */
     double external_wrench[6];
-    /* Bound of the error of the bite force in it, N. */
+    /* Uncertainty of the bite force in it, two standard deviations, N. */
     double external_uncertainty_n;
 } masseter_demand;
 

@@ -41,7 +41,7 @@ class ExternalForce:
         """Moment about the platform's origin, N m."""
     @property
     def uncertainty_n(self) -> float:
-        """Bound of the error of the bite force, N."""
+        """Uncertainty of the bite force, two standard deviations, N."""
 
 class Motion:
     """The scenario's motion, or the way to it, at a time. Twist and acceleration are differences over a period on either side."""
