@@ -73,20 +73,20 @@ impl Forces {
     }
 
     /// Refuses a bite force above the limit of the force control, or one that is no number, whatever law controls the force.
-    /// During a calibration the rough force counts: a limit has no time without a force. A cell that hides a force takes no part
-    /// in a limit of the estimate.
+    /// During a calibration the rough force counts: a limit has no time without a force. Of a control by the estimate the drives'
+    /// force counts beside the estimate, so a cell that hides a force does not hide it from the limit.
     pub(crate) fn check_bite(&self) -> Result<(), Fault> {
         let Some(control) = &self.control else { return Ok(()) };
-        let bite_n = match control.source {
-            ForceSource::Estimate => self.observer.as_ref().and_then(ForceObserver::rough_bite_n),
-            ForceSource::LoadCell => self.load_cell_n,
+        let bites_n = match control.source {
+            ForceSource::Estimate => [
+                self.observer.as_ref().and_then(ForceObserver::rough_bite_n),
+                self.external().map(|external| external.bite_n()),
+            ],
+            ForceSource::LoadCell => [self.load_cell_n, None],
         };
-        match bite_n {
-            Some(bite_n) if bite_n.is_nan() || bite_n > control.limit_n() => {
-                Err(Fault::new(Cause::ForceLimit, bite_n, control.limit_n()))
-            }
-            _ => Ok(()),
-        }
+        let limit_n = control.limit_n();
+        let beyond = bites_n.into_iter().flatten().find(|bite_n| bite_n.is_nan() || *bite_n > limit_n);
+        beyond.map_or(Ok(()), |bite_n| Err(Fault::new(Cause::ForceLimit, bite_n, limit_n)))
     }
 
     /// The motion begins anew.
