@@ -196,6 +196,40 @@ fn a_break_of_the_food_withdraws_the_force_and_the_platform_does_not_rise() {
     assert!(output.status.success(), "{}", stdout(&output));
 }
 
+/// Lateral force of the jaw in a held bite between leaning teeth, rms, as bounds that only serve to report the values. The truth is the
+/// estimate, whose error is here below a newton.
+const LATERAL: &str = "
+[[require]]
+name = 'x'
+expression = '-{signal.external_force_x_n}'
+unit = 'N'
+during = 'signal.desired_bite_force_n > 24.99 N'
+statistic = 'mean'
+max = '100 N'
+[[require]]
+name = 'y'
+expression = '-{signal.external_force_y_n}'
+unit = 'N'
+during = 'signal.desired_bite_force_n > 24.99 N'
+statistic = 'mean'
+max = '100 N'
+";
+
+#[test]
+fn lateral_control_brings_the_lateral_force_to_what_was_asked_for() {
+    let example = include_str!("../examples/suite/bite_slope.toml");
+    let (settings, _) = example.split_once("[[require]]").unwrap();
+    let table = "[force_control.lateral]\npeak_n = [0.0, 0.0]\n";
+    assert!(settings.contains(table));
+    let lateral_n = |instead: &str| found(&(settings.replace(table, instead) + LATERAL), &["x", "y"]);
+    let [without, with] = ["", table].map(lateral_n);
+    println!("without {without:?}, with {with:?}");
+    assert!(without[0].hypot(without[1]) > 4.0 && with[0].hypot(with[1]) < 1.0, "{without:?} {with:?}");
+    let pressed = lateral_n("[force_control.lateral]\npeak_n = [0.0, 4.0]\n");
+    println!("4 N along y: {pressed:?}");
+    assert!(pressed[0].hypot(pressed[1] - 4.0) < 1.0, "{pressed:?}");
+}
+
 /// Friction in the controller's model that is 30 % too small.
 const WRONG_FRICTION: &str = "slide_friction_n = 3.5\nviscous_friction_n_s_per_m = 14.0";
 

@@ -14,10 +14,10 @@ use masseter_scenario::{
     AxesConfig, BrakeConfig, CanConfig, ChecksConfig, ChewingConfig, ControllerConfig, DcfRead, DriveConfig,
     DriveProfile, DrivesConfig, DryConfig, DynamicsConfig, ExpectConfig, FaultConfig, FaultDeclaration,
     FaultKindConfig, FileConfig, FoodConfig, ForceControlConfig, ForceEstimateConfig, FrictionConfig,
-    HomingConfig, IdentityConfig, JawConfig, Key, LateralConfig, LoadCellConfig, MotionConfig, OpeningConfig,
-    PdosConfig, PhaseShares, ProtrusionConfig, QuirkConfig, QuirkKindConfig, Range, RealtimeConfig,
-    RecordingConfig, RequirementConfig, Scenario, ScenarioError, StimulusConfig, StoreConfig, StudyConfig,
-    TeethConfig, ToothConfig, TrajectoryLimitsConfig, UnitsConfig, unit_of,
+    HomingConfig, IdentityConfig, JawConfig, Key, LateralConfig, LateralForceConfig, LoadCellConfig,
+    MotionConfig, OpeningConfig, PdosConfig, PhaseShares, ProtrusionConfig, QuirkConfig, QuirkKindConfig,
+    Range, RealtimeConfig, RecordingConfig, RequirementConfig, Scenario, ScenarioError, StimulusConfig,
+    StoreConfig, StudyConfig, TeethConfig, ToothConfig, TrajectoryLimitsConfig, UnitsConfig, unit_of,
 };
 use serde_json::Value;
 
@@ -39,7 +39,7 @@ const DOCUMENTS: [(&str, Rewrite); 3] =
     [("scenario.md", scenario), ("signals.md", signals), ("commands.md", commands)];
 
 /// The tables of a scenario by the TOML that leads to them.
-const TABLES: [(&str, &[Key]); 47] = [
+const TABLES: [(&str, &[Key]); 48] = [
     ("", Scenario::KEYS),
     ("[motion] kind = \"chewing\"", ChewingConfig::KEYS),
     ("[motion] kind = \"opening\"", OpeningConfig::KEYS),
@@ -79,6 +79,7 @@ const TABLES: [(&str, &[Key]); 47] = [
     ("[load_cell]", LoadCellConfig::KEYS),
     ("[force_estimate]", ForceEstimateConfig::KEYS),
     ("[force_control]", ForceControlConfig::KEYS),
+    ("[force_control.lateral]", LateralForceConfig::KEYS),
     ("[realtime]", RealtimeConfig::KEYS),
     ("[recording]", RecordingConfig::KEYS),
     ("[checks]", ChecksConfig::KEYS),

@@ -7,8 +7,9 @@
 //! The speed begins with that of the motion, so that nothing jumps. The damping D grows towards the contact of the
 //! teeth, and with the stiffness that the bite shows. A bite ends after its time, at a break of the food, or when the opening motion reaches the jaw. After that
 //! the jaw does not close. The jaw waits, gives way to more than the force of contact, and follows the motion again
-//! when the motion opens. The law controls the height only; the other five freedoms keep to the motion. Limit of
-//! stability: `docs/dynamics-control.md`.
+//! when the motion opens. As an option, the lateral position follows the same admittance in a bite, towards a lateral
+//! force in proportion to the desired bite force. All other freedoms keep to the motion. Limit of stability:
+//! `docs/dynamics-control.md`.
 
 mod shown_stiffness;
 
@@ -17,7 +18,7 @@ use std::f64::consts::PI;
 use masseter_model::geometry::{Pose, Vec3};
 use masseter_runtime::{control::NoBranch, messages::codes::ControllerState, named::Declared};
 use masseter_scenario::{BiteProfile, ForceControlConfig, ForceSource, MOST_LEAD_CYCLES, Scenario};
-use nalgebra::Translation3;
+use nalgebra::{Translation3, Vector2};
 
 use crate::pose_law::{Demand, Detour, LawFailed, PoseLaw};
 use crate::{forces::signal, pose_control::PoseControl};
@@ -74,13 +75,15 @@ pub(crate) struct ForceControl {
     /// The stiffness of the present bite.
     stiffness: ShownStiffness,
     phase: Phase,
-    /// The last height of the motion, m.
-    motion_m: Option<f64>,
-    /// Speed of the requested height, and of the motion's height, m/s.
-    speed_m_s: f64,
-    motion_m_s: f64,
-    /// Requested heights above those of the motion, the newest first, m.
-    offsets_m: [f64; MOST_LEAD_CYCLES + 1],
+    /// The last position of the motion, m.
+    motion_m: Option<Vec3>,
+    /// Velocity of the requested position, and of the motion, m/s.
+    speed_m_s: Vec3,
+    motion_m_s: Vec3,
+    /// Ways from the motion to the requested positions, the newest first, m.
+    offsets_m: [Vec3; MOST_LEAD_CYCLES + 1],
+    /// Lateral force of the jaw on what it bites, base axes, N.
+    lateral_n: Vector2<f64>,
     /// Bite forces of the last cycles, the newest first, N.
     bites_n: [f64; BREAK_CYCLES],
     /// Desired bite force, N; 0 between bites.
@@ -108,9 +111,10 @@ impl ForceControl {
             ),
             phase: Phase::Free,
             motion_m: None,
-            speed_m_s: 0.0,
-            motion_m_s: 0.0,
-            offsets_m: [0.0; MOST_LEAD_CYCLES + 1],
+            speed_m_s: Vec3::zeros(),
+            motion_m_s: Vec3::zeros(),
+            offsets_m: [Vec3::zeros(); MOST_LEAD_CYCLES + 1],
+            lateral_n: Vector2::zeros(),
             bites_n: [0.0; BREAK_CYCLES],
             desired_n: 0.0,
         }
@@ -120,7 +124,7 @@ impl ForceControl {
         self.bites_n[0]
     }
 
-    /// Takes the newest force and the newest height of the motion. A cycle without a force keeps the last force. A load
+    /// Takes the newest force and the newest position of the motion. A cycle without a force keeps the last force. A load
     /// cell that stays at the end of its range hides the bite force, so the law fails.
     fn observe(&mut self, demand: &Demand) -> Result<(), LawFailed> {
         let known_n = match self.config.source {
@@ -130,9 +134,13 @@ impl ForceControl {
         let bite_n = known_n.unwrap_or(self.bite_n());
         self.bites_n.rotate_right(1);
         self.bites_n[0] = bite_n;
-        let height_m = demand.ahead.translation.z;
-        let before_m = self.motion_m.replace(height_m).unwrap_or(height_m);
-        self.motion_m_s = (height_m - before_m) / self.period_s;
+        if let Some(external) = &demand.external {
+            let [x_n, y_n, _] = external.force_n;
+            self.lateral_n = Vector2::new(-x_n, -y_n);
+        }
+        let motion_m = demand.ahead.translation.vector;
+        let before_m = self.motion_m.replace(motion_m).unwrap_or(motion_m);
+        self.motion_m_s = (motion_m - before_m) / self.period_s;
         let doubt_n = match self.config.source {
             ForceSource::Estimate => {
                 demand.external.map_or(f64::INFINITY, |external| ESTIMATE_DOUBT * external.uncertainty_n)
@@ -158,20 +166,20 @@ impl ForceControl {
         let is_running = state == ControllerState::Running;
         match self.phase {
             Phase::Free => {
-                let closes = is_running && self.motion_m_s > 0.0;
+                let closes = is_running && self.motion_m_s.z > 0.0;
                 let bites = closes && self.bite_n() >= self.config.contact_n;
                 if bites { Phase::Biting { time_s: 0.0 } } else { Phase::Free }
             }
             Phase::Biting { .. } if self.has_broken() => Phase::Broken,
             Phase::Biting { time_s } => {
                 let time_s = time_s + self.period_s;
-                let is_taken_along = self.motion_m_s < -SLOW_M_S && self.offsets_m[0] >= 0.0;
+                let is_taken_along = self.motion_m_s.z < -SLOW_M_S && self.offsets_m[0].z >= 0.0;
                 let goes_on = is_running && time_s < self.config.bite_s && !is_taken_along;
                 if goes_on { Phase::Biting { time_s } } else { Phase::Opening }
             }
             waiting => {
-                let is_near = self.offsets_m[0].abs() < NEAR_M;
-                let is_slow = (self.speed_m_s - self.motion_m_s).abs() < SLOW_M_S;
+                let is_near = self.offsets_m[0].norm() < NEAR_M;
+                let is_slow = (self.speed_m_s - self.motion_m_s).norm() < SLOW_M_S;
                 if is_near && is_slow { Phase::Free } else { waiting }
             }
         }
@@ -181,45 +189,69 @@ impl ForceControl {
     /// the shown stiffness needs.
     fn damping_n_s_per_m(&self) -> f64 {
         let Self { config, closed_m, offsets_m, motion_m, .. } = self;
-        let opening_m = closed_m - motion_m.unwrap_or(*closed_m) - offsets_m[0];
+        let opening_m = closed_m - motion_m.map_or(*closed_m, |motion_m| motion_m.z) - offsets_m[0].z;
         let share = (opening_m / config.tooth_zone_m).clamp(0.0, 1.0);
         let ratio = config.damping_n_s_per_m / config.tooth_damping_n_s_per_m;
         (config.tooth_damping_n_s_per_m * ratio.powf(share)).max(self.stiffness.least_damping_n_s_per_m())
     }
 
-    /// The desired speed of the height in this phase, m/s.
-    fn wanted_m_s(&self) -> f64 {
+    /// Desired lateral force of the jaw, base axes, N.
+    fn desired_lateral_n(&self) -> Vector2<f64> {
+        let peak_n = self.config.lateral.map_or([0.0; 2], |lateral| lateral.peak_n);
+        Vector2::from(peak_n) * (self.desired_n / self.config.peak_n)
+    }
+
+    /// The desired velocity in this phase, m/s. A lateral force moves the jaw only in a bite: later nothing holds the jaw
+    /// against an error of the estimate.
+    fn wanted_m_s(&self) -> Vec3 {
         let (offset_m, damping) = (self.offsets_m[0], self.damping_n_s_per_m());
+        let most_m_s = self.config.closing_m_s;
         match self.phase {
             Phase::Free => self.motion_m_s,
-            Phase::Biting { .. } => ((self.desired_n - self.bite_n()) / damping).min(self.config.closing_m_s),
-            Phase::Opening | Phase::Broken if offset_m < 0.0 => {
-                let gives_way_m_s = (self.bite_n() - self.config.contact_n).max(0.0) / damping;
-                -gives_way_m_s.min(self.config.closing_m_s)
+            Phase::Biting { .. } => {
+                let lateral_m_s = (self.desired_lateral_n() - self.lateral_n) / damping;
+                let closing_m_s = ((self.desired_n - self.bite_n()) / damping).min(most_m_s);
+                lateral_m_s.cap_magnitude(most_m_s).push(closing_m_s)
             }
-            Phase::Opening | Phase::Broken => self.motion_m_s - offset_m / CATCH_UP_S,
+            Phase::Opening | Phase::Broken if offset_m.z < 0.0 => {
+                let gives_way_m_s = (self.bite_n() - self.config.contact_n).max(0.0) / damping;
+                Vec3::new(0.0, 0.0, -gives_way_m_s.min(most_m_s))
+            }
+            Phase::Opening | Phase::Broken => {
+                let back_m_s = offset_m / CATCH_UP_S;
+                self.motion_m_s - back_m_s.xy().cap_magnitude(most_m_s).push(back_m_s.z)
+            }
         }
     }
 
-    /// The next height above that of the motion, m.
-    fn advance(&mut self) -> Result<f64, LawFailed> {
+    /// The next way from the motion, m.
+    fn advance(&mut self) -> Result<Vec3, LawFailed> {
         if self.phase == Phase::Free {
             self.speed_m_s = self.motion_m_s;
-            return Ok(0.0);
+            return Ok(Vec3::zeros());
         }
         let share = self.period_s / (self.period_s + ForceControlConfig::MASS_TIME_S);
         self.speed_m_s += (self.wanted_m_s() - self.speed_m_s) * share;
         let offset_m = self.offsets_m[0] + (self.speed_m_s - self.motion_m_s) * self.period_s;
         let reach_m = self.config.reach_m;
-        if offset_m > reach_m {
-            self.speed_m_s = self.speed_m_s.min(self.motion_m_s);
+        if offset_m.z > reach_m {
+            self.speed_m_s.z = self.speed_m_s.z.min(self.motion_m_s.z);
+        }
+        // Without lateral control the reach is 0: the jaw keeps to the motion.
+        let lateral_reach_m = self.config.lateral.map_or(0.0, |lateral| lateral.reach_m);
+        let lateral_m = offset_m.xy();
+        if lateral_m.norm() >= lateral_reach_m {
+            (self.speed_m_s.x, self.speed_m_s.y) = (self.motion_m_s.x, self.motion_m_s.y);
         }
         // Under a further press, food can push back with any force.
-        if offset_m < -reach_m { Err(LawFailed) } else { Ok(offset_m.min(reach_m)) }
+        if offset_m.z < -reach_m {
+            return Err(LawFailed);
+        }
+        Ok(lateral_m.cap_magnitude(lateral_reach_m).push(offset_m.z.min(reach_m)))
     }
 
-    /// The height above that of the motion, this many cycles before the coming one, m.
-    fn offset_before_m(&self, cycles: f64) -> f64 {
+    /// The way from the motion, this many cycles before the coming one, m.
+    fn offset_before_m(&self, cycles: f64) -> Vec3 {
         let at = (cycles - 1.0).clamp(0.0, (MOST_LEAD_CYCLES - 1) as f64);
         let (place, share) = (at.floor() as usize, at.fract());
         self.offsets_m[place] + (self.offsets_m[place + 1] - self.offsets_m[place]) * share
@@ -239,25 +271,36 @@ impl PoseLaw for ForceControl {
         self.offsets_m.rotate_right(1);
         self.offsets_m[0] = offset_m;
         let desired = Translation3::from(at_sample_m) * demand.desired;
-        let ahead = Translation3::new(0.0, 0.0, offset_m) * demand.ahead;
+        let ahead = Translation3::from(offset_m) * demand.ahead;
         self.position.command(&Demand { desired, ahead, ..*demand })
     }
 
     fn detour(&self) -> Detour {
-        let vertical = |value| Vec3::new(0.0, 0.0, value);
         Detour {
-            at_sample_m: vertical(self.offset_before_m(self.lead_cycles)),
-            ahead_m_s: vertical(self.speed_m_s - self.motion_m_s),
+            at_sample_m: self.offset_before_m(self.lead_cycles),
+            ahead_m_s: self.speed_m_s - self.motion_m_s,
         }
     }
 
     fn declared(&self) -> Declared {
-        let signals = vec![
+        let mut signals = vec![
             signal("desired_bite_force_n", "N", "What the bite force is to be; 0 between bites."),
             signal("force_detour_m", "m", "Height asked for above that of the motion."),
             signal("force_stiffness_n_per_m", "N/m", "Stiffness that the bite has shown so far."),
             signal("force_phase", "", "0: position control; 1: force control; 2: opening; 3: food broke."),
         ];
+        if self.config.lateral.is_some() {
+            signals.extend([
+                signal(
+                    "desired_lateral_force_x_n",
+                    "N",
+                    "What the lateral force of the jaw along x of the base is to be.",
+                ),
+                signal("desired_lateral_force_y_n", "N", "The same along y."),
+                signal("lateral_detour_x_m", "m", "Way asked for beside the motion along x of the base."),
+                signal("lateral_detour_y_m", "m", "The same along y."),
+            ]);
+        }
         Declared { signals, ..self.position.declared() }
     }
 
@@ -272,7 +315,13 @@ impl PoseLaw for ForceControl {
             Phase::Opening => 2.0,
             Phase::Broken => 3.0,
         };
-        signals.copy_from_slice(&[self.desired_n, self.offsets_m[0], self.stiffness.n_per_m, phase]);
+        let [offset_m, lateral_n] = [self.offsets_m[0], self.desired_lateral_n().push(0.0)];
+        let vertical = [self.desired_n, offset_m.z, self.stiffness.n_per_m, phase];
+        let lateral = [lateral_n.x, lateral_n.y, offset_m.x, offset_m.y];
+        signals
+            .iter_mut()
+            .zip(vertical.into_iter().chain(lateral))
+            .for_each(|(signal, value)| *signal = value);
     }
 
     fn branch(&self) -> Result<Box<dyn PoseLaw>, NoBranch> {

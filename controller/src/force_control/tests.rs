@@ -1,6 +1,6 @@
-//! The law against food in a world with height alone: drives two cycles late, and a low-pass as the observer.
+//! The law against food in a world without turns: drives two cycles late, and a low-pass as the observer.
 
-use masseter_scenario::LoadCellConfig;
+use masseter_scenario::{LateralForceConfig, LoadCellConfig};
 
 use super::*;
 use crate::pose_law::ExternalForce;
@@ -19,11 +19,14 @@ const END_S: f64 = 2.0 * MOVE_S + CLOSED_S;
 struct World {
     law: ForceControl,
     cycle: u64,
-    /// Requested heights, the newest last, m; the closed mouth is at 0.
-    asked_m: Vec<f64>,
-    /// True force, N, cycle by cycle.
+    /// Requested positions, the newest last, m; the closed mouth is at 0.
+    asked_m: Vec<Vec3>,
+    /// True bite force, N, cycle by cycle.
     bites_n: Vec<f64>,
-    estimate_n: f64,
+    /// Estimated force on the food, N.
+    estimate_n: Vec3,
+    /// Direction in which the food is pressed.
+    normal: Vec3,
     stiffness_n_per_m: f64,
     thickness_m: f64,
     /// Depth at which the food breaks, m.
@@ -37,9 +40,10 @@ impl World {
         Self {
             law: ForceControl::new(&Scenario::default(), config, 0.0),
             cycle: 0,
-            asked_m: vec![-OPENING_M; LEAD_CYCLES],
+            asked_m: vec![-OPENING_M * Vec3::z(); LEAD_CYCLES],
             bites_n: Vec::new(),
-            estimate_n: 0.0,
+            estimate_n: Vec3::zeros(),
+            normal: Vec3::z(),
             stiffness_n_per_m: 3500.0,
             thickness_m: 0.01,
             breaks_at_m: f64::INFINITY,
@@ -54,19 +58,20 @@ impl World {
     }
 
     fn step(&mut self) -> Result<(), LawFailed> {
-        let height_m = self.asked_m[self.asked_m.len() - LEAD_CYCLES];
-        let compression_m = height_m + self.thickness_m;
+        let place_m = self.asked_m[self.asked_m.len() - LEAD_CYCLES];
+        let compression_m = (place_m + self.thickness_m * Vec3::z()).dot(&self.normal);
         if compression_m > self.breaks_at_m {
             self.stiffness_n_per_m = 0.0;
         }
-        let bite_n = self.stiffness_n_per_m * compression_m.max(0.0);
+        let force_n = self.stiffness_n_per_m * compression_m.max(0.0) * self.normal;
+        let bite_n = force_n.z;
         self.bites_n.push(bite_n);
-        self.estimate_n += (bite_n - self.estimate_n) * PERIOD_S / (PERIOD_S + OBSERVER_S);
+        self.estimate_n += (force_n - self.estimate_n) * (PERIOD_S / (PERIOD_S + OBSERVER_S));
         let time_s = self.cycle as f64 * PERIOD_S;
         self.cycle += 1;
         let pose = |time_s| Pose::translation(0.0, 0.0, Self::motion_m(time_s));
         let external =
-            ExternalForce { force_n: [0.0, 0.0, -self.estimate_n], moment_nm: [0.0; 3], uncertainty_n: 0.5 };
+            ExternalForce { force_n: (-self.estimate_n).into(), moment_nm: [0.0; 3], uncertainty_n: 0.5 };
         let asked = self.law.command(&Demand {
             cycle: self.cycle,
             period_s: PERIOD_S,
@@ -80,7 +85,7 @@ impl World {
             external: Some(external),
             load_cell_n: Some(bite_n.clamp(self.cell_ends_n[0], self.cell_ends_n[1])),
         })?;
-        self.asked_m.push(asked.translation.z);
+        self.asked_m.push(asked.translation.vector);
         Ok(())
     }
 
@@ -103,7 +108,7 @@ impl World {
 
     /// Largest acceleration of the targets, m/s².
     fn most_acceleration_m_s2(&self) -> f64 {
-        let bends = self.asked_m.windows(3).map(|at| (at[2] - 2.0 * at[1] + at[0]).abs() / PERIOD_S.powi(2));
+        let bends = self.asked_m.windows(3).map(|at| (at[2] - 2.0 * at[1] + at[0]).norm() / PERIOD_S.powi(2));
         bends.fold(0.0, f64::max)
     }
 }
@@ -174,7 +179,7 @@ fn after_the_bite_the_jaw_is_back_on_the_motion() {
     let mut world = World::new(ForceControlConfig::default());
     world.run_to(END_S);
     // The opening motion takes the jaw along, and ends before the jaw is back to the last micrometre.
-    assert!(world.law.offsets_m[0].abs() < 1e-5, "{:?}", world.law);
+    assert!(world.law.offsets_m[0].norm() < 1e-5, "{:?}", world.law);
     assert!(world.law.detour().at_sample_m.norm() < 1e-5);
 }
 
@@ -186,10 +191,11 @@ fn when_food_breaks_the_jaw_neither_slams_nor_closes_again() {
     while world.cycle < 1000 {
         world.step().unwrap();
         if world.stiffness_n_per_m == 0.0 {
-            broke_at_m = broke_at_m.or(world.asked_m.get(world.asked_m.len() - 1 - LEAD_CYCLES).copied());
+            broke_at_m =
+                broke_at_m.or(world.asked_m.get(world.asked_m.len() - 1 - LEAD_CYCLES).map(|at_m| at_m.z));
         }
     }
-    let highest_m = world.asked_m.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let highest_m = world.asked_m.iter().map(|at_m| at_m.z).fold(f64::NEG_INFINITY, f64::max);
     let travelled_m = highest_m - broke_at_m.unwrap();
     assert_eq!(world.law.phase, Phase::Broken);
     assert!((0.0..5e-4).contains(&travelled_m), "{travelled_m}");
@@ -201,14 +207,14 @@ fn when_food_breaks_the_jaw_neither_slams_nor_closes_again() {
 fn an_empty_mouth_closes_with_the_motion_and_a_wall_beyond_the_reach_ends_it() {
     let mut empty = World { stiffness_n_per_m: 0.0, ..World::new(hold()) };
     empty.run_to(END_S);
-    assert_eq!((empty.law.phase, empty.law.offsets_m), (Phase::Free, [0.0; MOST_LEAD_CYCLES + 1]));
+    assert_eq!((empty.law.phase, empty.law.offsets_m), (Phase::Free, [Vec3::zeros(); MOST_LEAD_CYCLES + 1]));
     let mut world = World {
         stiffness_n_per_m: 1.5e5,
         ..World::new(ForceControlConfig { reach_m: 0.003, damping_n_s_per_m: 1000.0, ..hold() })
     };
     let failed = (0..1000).find_map(|_| world.step().err());
     assert_eq!(failed, Some(LawFailed));
-    assert!(world.law.offsets_m[0] >= -0.003);
+    assert!(world.law.offsets_m[0].z >= -0.003);
 }
 
 /// A law by a load cell of 50 N.
@@ -237,10 +243,46 @@ fn a_load_cell_that_stays_at_the_end_of_its_range_ends_the_bite() {
     }
 }
 
+/// A held bite on food that leans: pressed, it pushes the jaw along x.
+fn on_a_slope(lateral: Option<LateralForceConfig>) -> World {
+    let normal = Vec3::new(0.2, 0.0, 1.0).normalize();
+    World { normal, ..World::new(ForceControlConfig { lateral, ..hold() }) }
+}
+
+#[test]
+fn only_with_lateral_control_does_the_jaw_give_way_to_a_side_and_then_it_comes_back() {
+    let mut world = on_a_slope(None);
+    world.run_to(0.8);
+    assert!(world.asked_m.iter().all(|asked_m| asked_m.x == 0.0), "the jaw keeps to the motion");
+    assert!(world.estimate_n.x > 5.0, "{}", world.estimate_n);
+    // Nothing but the reach ends the way on a slope without friction.
+    let lateral = LateralForceConfig { reach_m: 0.001, ..LateralForceConfig::default() };
+    let mut world = on_a_slope(Some(lateral));
+    world.run_to(0.8);
+    let most_m = world.asked_m.iter().map(|asked_m| asked_m.xy().norm()).fold(0.0, f64::max);
+    assert!((most_m - 0.001).abs() < 1e-9 && world.asked_m[800].x < 0.0, "{most_m}");
+    world.run_to(END_S);
+    assert!(world.law.offsets_m[0].norm() < 1e-5, "{:?}", world.law);
+    assert!(world.most_acceleration_m_s2() < 60.0, "{}", world.most_acceleration_m_s2());
+}
+
+/// On a spring that leans along x, a side force along x moves the jaw until the spring gives that force.
+#[test]
+fn a_desired_lateral_force_goes_with_the_bite_force() {
+    let lateral = LateralForceConfig { peak_n: [6.0, 0.0], reach_m: 0.01 };
+    let mut world = on_a_slope(Some(lateral));
+    world.run_to(0.5);
+    // The spring turns 30 N of bite into 6 N to the side: this target moves nothing to the side.
+    assert!((world.estimate_n.x - 6.0).abs() < 0.3, "{}", world.estimate_n);
+    assert!((world.law.desired_lateral_n().x - 6.0).abs() < 1e-9);
+    world.run_to(0.9);
+    assert_eq!(world.law.desired_lateral_n(), Vector2::zeros(), "no bite");
+}
+
 #[test]
 fn the_detour_at_a_sample_is_what_was_asked_for_lead_cycles_before() {
     let mut law = World::new(hold()).law;
-    law.offsets_m[..4].copy_from_slice(&[3.0, 2.0, 1.0, 0.0]);
+    law.offsets_m[..4].copy_from_slice(&[3.0, 2.0, 1.0, 0.0].map(|z_m| z_m * Vec3::z()));
     for (lead_cycles, expected_m) in [(1.0, 3.0), (2.0, 2.0), (2.5, 1.5), (3.0, 1.0)] {
         law.lead_cycles = lead_cycles;
         assert!((law.detour().at_sample_m.z - expected_m).abs() < 1e-12, "{lead_cycles}");

@@ -1,7 +1,7 @@
 //! The pose that the jaw should have at each sample, and by how much the motion is late.
 //!
-//! While the motion plays, the pose is the scenario's, computed here; with force control its height follows the controller's
-//! within `reach_m`. The motion begins with the first sample in which the controller says `running`, but no later than its
+//! While the motion plays, the pose is the scenario's, computed here; with force control its height, and with lateral control its
+//! position, follows the controller's within the reach. The motion begins with the first sample in which the controller says `running`, but no later than its
 //! [lead-in](StateOrder) allows. It goes on by a period with each cycle, but for those that the controller's loop lost. A
 //! controller waits where commands or readings are lost: its motion is then
 //! late, and the pose here is as late, up to the limit of `checks`. What was late stays late, but for what cycles without
@@ -9,7 +9,7 @@
 //! stays. Where the machine loses cycles while the rate of the motion changes, the pose is not exactly the controller's.
 
 use masseter_controller::{playback::Playback, trajectory::Trajectory};
-use masseter_model::geometry::{Mechanism, Pose};
+use masseter_model::geometry::{Mechanism, Pose, Vec3};
 use masseter_runtime::messages::codes::Cause;
 use masseter_runtime::messages::{Parameters, Reading, State, pose_fields};
 use masseter_runtime::named::{Declared, PlayedMotion};
@@ -49,9 +49,10 @@ pub(crate) struct Reference {
     /// The speed of the motion's clock between its ramps.
     full_speed: f64,
     most_lag_s: f64,
-    /// How far force control may lead the jaw up or down from the motion, m.
+    /// How far force control may lead the jaw up or down from the motion, and to a side, m.
     reach_m: f64,
-    detour_m: f64,
+    lateral_reach_m: f64,
+    detour_m: Vec3,
     order: StateOrder,
     /// Places of the parameters for rate and amplitude, and a value that is the controller's own alone: it changes nothing.
     places: [Option<(usize, Option<f64>)>; 2],
@@ -94,6 +95,7 @@ const FULL_SHARE: f64 = 0.999;
 impl Reference {
     pub(crate) fn new(scenario: &Scenario, declared: &Declared) -> Self {
         let is_of_scenario = declared.motion == PlayedMotion::Scenario;
+        let lateral = scenario.force_control.and_then(|control| control.lateral);
         let place = |name: &str| {
             let place = declared.place_of(name).ok()?;
             let own = (!scenario.parameters.contains_key(name)).then(|| declared.parameters[place].value);
@@ -105,6 +107,7 @@ impl Reference {
             full_speed: scenario.dry.speed_now(),
             most_lag_s: scenario.checks.motion_lag_ms / 1e3,
             reach_m: scenario.force_control.map_or(0.0, |config| config.reach_m),
+            lateral_reach_m: lateral.map_or(0.0, |lateral| lateral.reach_m),
             order: StateOrder::new(scenario, declared),
             places: ["motion_rate", "motion_amplitude"].map(place),
             ..Self::default()
@@ -182,10 +185,11 @@ impl Reference {
         self.progress_s = -playback.rest_s() - waited_s;
         if let Some(stated) = of.next_use.filter(|_| of.is_used && self.reach_m > 0.0).and_then(desired_pose)
         {
-            let detour_m = stated.translation.z - pose.translation.z;
-            self.detour_m = detour_m.clamp(-self.reach_m, self.reach_m);
+            let detour_m = stated.translation.vector - pose.translation.vector;
+            let lateral_m = detour_m.xy().cap_magnitude(self.lateral_reach_m);
+            self.detour_m = lateral_m.push(detour_m.z.clamp(-self.reach_m, self.reach_m));
         }
-        pose.translation.z += self.detour_m;
+        pose.translation.vector += self.detour_m;
         self.pose = as_published(&pose);
         if self.stop_cycle.is_some_and(|cycle| cycle <= of.cycle) {
             playback.stop();

@@ -137,6 +137,20 @@ section! {
         /// Largest distance of the platform from the motion. Closing stops there; food that keeps the mouth further
         /// open ends the run in a safe stop (`law_failed`).
         pub reach_m: f64 = 0.012 => Within(0.000_001, 0.05),
+        /// Control of the lateral force beside the bite force; none without the table.
+        pub lateral: Option<LateralForceConfig> = None,
+    }
+}
+
+section! {
+    /// Control of the lateral force in a bite.
+    #[derive(Copy)]
+    pub struct LateralForceConfig {
+        /// Force of the lower jaw on the food along x and y of the base, while the bite force is at its peak; otherwise in proportion
+        /// to the bite force. With zeros the jaw gives way to every lateral force.
+        pub peak_n: [f64; 2] = [0.0; 2] => Within(-1000.0, 1000.0) "together at most `force_control.peak_n`",
+        /// Largest lateral distance of the platform from the motion. There the platform gives way no further.
+        pub reach_m: f64 = 0.005 => Within(0.000_001, 0.05),
     }
 }
 
@@ -202,7 +216,26 @@ impl ForceControlConfig {
             );
             require(damping >= least && damping.is_finite(), &key, &damping, need)?;
         }
-        Ok(())
+        self.lateral.as_ref().map_or(Ok(()), |lateral| lateral.validate(self))
+    }
+}
+
+impl LateralForceConfig {
+    fn validate(&self, control: &ForceControlConfig) -> Checked {
+        self.check_ranges(ranges_of("force_control.lateral"))?;
+        let need = "use \"estimate\", or leave [force_control.lateral] away: a load cell shows the vertical force alone";
+        require(control.source == ForceSource::Estimate, "force_control.source", &"\"load_cell\"", need)?;
+        let [x_n, y_n] = self.peak_n;
+        let need = format!(
+            "use at most {} N in all, force_control.peak_n: more slides off the food",
+            control.peak_n
+        );
+        require(
+            x_n.hypot(y_n) <= control.peak_n,
+            "force_control.lateral.peak_n",
+            &format!("{:?}", self.peak_n),
+            need,
+        )
     }
 }
 
@@ -276,6 +309,26 @@ mod tests {
                 Some(reason) => assert!(said.as_ref().is_err_and(|said| said.contains(reason)), "{said:?}"),
             }
         }
+    }
+
+    #[test]
+    fn lateral_control_needs_the_estimate_and_no_more_force_than_the_bite() {
+        let refusal = |control: ForceControlConfig| {
+            control.validate(0.002, 0.003).map_err(|error| error.to_string()).err()
+        };
+        let of = |peak_n| ForceControlConfig {
+            lateral: Some(LateralForceConfig { peak_n, ..LateralForceConfig::default() }),
+            ..ForceControlConfig::default()
+        };
+        assert_eq!(refusal(of([-18.0, 24.0])), None);
+        let said = refusal(of([-18.1, 24.0])).unwrap();
+        assert!(said.contains("lateral.peak_n = [-18.1, 24.0]: use at most 30 N in all"), "{said}");
+        let by_cell = ForceControlConfig { source: ForceSource::LoadCell, ..of([0.0; 2]) };
+        let said = refusal(by_cell).unwrap();
+        assert!(
+            said.contains("leave [force_control.lateral] away: a load cell shows the vertical"),
+            "{said}"
+        );
     }
 
     #[test]

@@ -48,7 +48,8 @@ pub use faults::{
     FaultKindConfig, FaultSize, Overlap, PlatformFault, ProcessFault,
 };
 pub use force::{
-    BiteProfile, ForceControlConfig, ForceEstimateConfig, ForceFusion, ForceSource, LoadCellConfig,
+    BiteProfile, ForceControlConfig, ForceEstimateConfig, ForceFusion, ForceSource, LateralForceConfig,
+    LoadCellConfig,
 };
 pub use jaw::{FoodConfig, JawConfig, MOST_PAIRS, Material, TeethConfig, ToothConfig};
 pub use masseter_model::dynamics::{AxesConfig, DynamicsConfig, FrictionConfig, FrictionModel};

@@ -61,7 +61,8 @@ fn drives_n_per_m(scenario: &Scenario, mechanism: &Mechanism, closed: &Pose) -> 
     Some(jacobian.transpose() * Matrix6::from_diagonal(&loops) * jacobian)
 }
 
-/// Vertical force by requested height of the platform, N/m, for contacts of this stiffness on these teeth.
+/// Vertical force by requested height of the platform, N/m, for contacts of this stiffness on these teeth. With lateral control the
+/// largest of all directions: a contact that does not slide is as stiff to the side.
 ///
 /// With the stiffness C of the contacts and D of the drives, the request z meets C (C + D)⁻¹ D z.
 fn with_n_per_m(
@@ -71,15 +72,26 @@ fn with_n_per_m(
     teeth: &[u8],
     each_n_per_m: f64,
 ) -> f64 {
+    let is_lateral = scenario.force_control.is_some_and(|control| control.lateral.is_some());
     let mut contacts = Matrix6::zeros();
     for tooth in scenario.arch().iter().filter(|tooth| teeth.contains(&tooth.number)) {
         let normal = closed.rotation * Vec3::from(tooth.normal).normalize();
-        let moment = (closed.rotation * Vec3::from(tooth.point_m)).cross(&normal);
-        let row = Vector6::new(normal.x, normal.y, normal.z, moment.x, moment.y, moment.z);
-        contacts += row * row.transpose() * each_n_per_m;
+        let across = if is_lateral {
+            [Vec3::x(), Vec3::y()].map(|side| side.cross(&normal))
+        } else {
+            [Vec3::zeros(); 2]
+        };
+        for direction in [normal, across[0], across[1]] {
+            let moment = (closed.rotation * Vec3::from(tooth.point_m)).cross(&direction);
+            let row = Vector6::new(direction.x, direction.y, direction.z, moment.x, moment.y, moment.z);
+            contacts += row * row.transpose() * each_n_per_m;
+        }
     }
-    let z = Vector6::z();
-    (contacts + drives).lu().solve(&(drives * z)).map_or(0.0, |moved| z.dot(&(contacts * moved)))
+    let whole = (contacts + drives).lu();
+    let against =
+        |way: Vector6<f64>| whole.solve(&(drives * way)).map_or(0.0, |moved| way.dot(&(contacts * moved)));
+    let sides = [Vector6::x(), Vector6::y()].into_iter().filter(|_| is_lateral);
+    sides.chain([Vector6::z()]).map(against).fold(0.0, f64::max)
 }
 
 impl Stated<'_> {
@@ -121,6 +133,15 @@ mod tests {
     fn the_default_statement_is_that_of_the_default_drives_and_teeth() {
         assert_eq!(warnings_of("[teeth]\n[food]\n[force_control]\ndamping_n_s_per_m = 20.0"), [""; 0]);
         assert_eq!(warnings_of("[force_control]"), [""; 0], "nothing touches");
+    }
+
+    #[test]
+    fn with_lateral_control_the_drives_to_the_side_count_too() {
+        let teeth = "[teeth]\n[force_control]\ntooth_damping_n_s_per_m = 3000\n";
+        assert_eq!(warnings_of(teeth), [""; 0]);
+        let lateral = format!("{}[force_control.lateral]", teeth.replace("3000", "2000"));
+        let [warning] = &warnings_of(&lateral)[..] else { panic!("one warning") };
+        assert!(warning.contains("tooth_stiffness_n_per_m to 588984"), "{warning}");
     }
 
     #[test]
