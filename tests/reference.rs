@@ -15,9 +15,10 @@ use masseter_scenario::{
     DriveProfile, DrivesConfig, DryConfig, DynamicsConfig, ExpectConfig, FaultConfig, FaultDeclaration,
     FaultKindConfig, FileConfig, FoodConfig, ForceControlConfig, ForceEstimateConfig, FrictionConfig,
     HomingConfig, IdentityConfig, JawConfig, Key, LateralConfig, LateralForceConfig, LoadCellConfig,
-    MotionConfig, OpeningConfig, PdosConfig, PhaseShares, ProtrusionConfig, QuirkConfig, QuirkKindConfig,
-    Range, RealtimeConfig, RecordingConfig, RequirementConfig, Scenario, ScenarioError, StimulusConfig,
-    StoreConfig, StudyConfig, TeethConfig, ToothConfig, TrajectoryLimitsConfig, UnitsConfig, unit_of,
+    MotionConfig, OpeningConfig, PdosConfig, PhaseShares, ProbeConfig, ProtrusionConfig, QuirkConfig,
+    QuirkKindConfig, Range, RealtimeConfig, RecordingConfig, RequirementConfig, Scenario, ScenarioError,
+    StimulusConfig, StoreConfig, StudyConfig, TeethConfig, ToothConfig, TrajectoryLimitsConfig, UnitsConfig,
+    unit_of,
 };
 use serde_json::Value;
 
@@ -39,7 +40,7 @@ const DOCUMENTS: [(&str, Rewrite); 3] =
     [("scenario.md", scenario), ("signals.md", signals), ("commands.md", commands)];
 
 /// The tables of a scenario by the TOML that leads to them.
-const TABLES: [(&str, &[Key]); 48] = [
+const TABLES: [(&str, &[Key]); 49] = [
     ("", Scenario::KEYS),
     ("[motion] kind = \"chewing\"", ChewingConfig::KEYS),
     ("[motion] kind = \"opening\"", OpeningConfig::KEYS),
@@ -80,6 +81,7 @@ const TABLES: [(&str, &[Key]); 48] = [
     ("[force_estimate]", ForceEstimateConfig::KEYS),
     ("[force_control]", ForceControlConfig::KEYS),
     ("[force_control.lateral]", LateralForceConfig::KEYS),
+    ("[force_control.probe]", ProbeConfig::KEYS),
     ("[realtime]", RealtimeConfig::KEYS),
     ("[recording]", RecordingConfig::KEYS),
     ("[checks]", ChecksConfig::KEYS),

@@ -16,11 +16,15 @@ mod shown_stiffness;
 use std::f64::consts::PI;
 
 use masseter_model::geometry::{Pose, Vec3};
-use masseter_runtime::{control::NoBranch, messages::codes::ControllerState, named::Declared};
+use masseter_runtime::{
+    control::NoBranch,
+    messages::codes::{Cause, ControllerState},
+    named::Declared,
+};
 use masseter_scenario::{BiteProfile, ForceControlConfig, ForceSource, MOST_LEAD_CYCLES, Scenario};
 use nalgebra::{Translation3, Vector2};
 
-use crate::pose_law::{Demand, Detour, LawFailed, PoseLaw};
+use crate::pose_law::{Demand, Detour, LawFailed, Notice, PoseLaw};
 use crate::{forces::signal, pose_control::PoseControl};
 use shown_stiffness::ShownStiffness;
 
@@ -42,14 +46,20 @@ const RAMP_SHARE: f64 = 0.1;
 const ESTIMATE_DOUBT: f64 = 0.2;
 /// Noise of a load cell that is taken off, in standard deviations: more than its peaks in a bite.
 const CELL_DOUBT: f64 = 5.0;
+/// Duration of a probe, s: half at the force of contact, half at that of the probe. A right damping settles within 20 ms.
+const PROBE_S: f64 = 0.3;
+/// Share of the force between contact and peak that the approach may add until the loop answers; the rest is for the swing after it.
+const APPROACH_SHARE: f64 = 0.5;
 /// Share of the force of contact below which nothing is between the teeth.
 const EMPTY_SHARE: f64 = 0.5;
 
 /// The source of the jaw's height.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Phase {
-    /// The motion.
+    /// The motion; before a probe, or on hard food, at a limited speed.
     Free,
+    /// The force of a probe, for this long, s. Its second half begins with this bite force, N, and height, m.
+    Probing { time_s: f64, from: Option<[f64; 2]> },
     /// The force, for this long, s.
     Biting { time_s: f64 },
     /// The motion again, once the motion is further open than the mouth.
@@ -88,6 +98,7 @@ pub(crate) struct ForceControl {
     bites_n: [f64; BREAK_CYCLES],
     /// Desired bite force, N; 0 between bites.
     desired_n: f64,
+    notice: Option<Notice>,
 }
 
 impl ForceControl {
@@ -117,6 +128,7 @@ impl ForceControl {
             lateral_n: Vector2::zeros(),
             bites_n: [0.0; BREAK_CYCLES],
             desired_n: 0.0,
+            notice: None,
         }
     }
 
@@ -162,18 +174,28 @@ impl ForceControl {
         before_n >= self.config.contact_n && self.bite_n() < BREAK_SHARE * before_n
     }
 
-    fn next_phase(&self, state: ControllerState) -> Phase {
+    fn next_phase(&mut self, state: ControllerState) -> Phase {
         let is_running = state == ControllerState::Running;
+        // A bite that a slow approach delayed ends with the motion: its turns would press on.
+        let is_late = self.config.probe.is_some() || self.offsets_m[0].z >= 0.0;
+        let is_taken_along = self.motion_m_s.z < -SLOW_M_S && is_late;
         match self.phase {
             Phase::Free => {
-                let closes = is_running && self.motion_m_s.z > 0.0;
-                let bites = closes && self.bite_n() >= self.config.contact_n;
-                if bites { Phase::Biting { time_s: 0.0 } } else { Phase::Free }
+                let follows = self.offsets_m[0].z < 0.0 && self.speed_m_s.z > 0.0;
+                let closes = is_running && (self.motion_m_s.z > 0.0 || follows);
+                match closes && self.bite_n() >= self.config.contact_n {
+                    false => Phase::Free,
+                    true if self.config.probe.is_some() && !self.stiffness.is_probed() => {
+                        Phase::Probing { time_s: 0.0, from: None }
+                    }
+                    true => Phase::Biting { time_s: 0.0 },
+                }
             }
-            Phase::Biting { .. } if self.has_broken() => Phase::Broken,
+            Phase::Probing { .. } | Phase::Biting { .. } if self.has_broken() => Phase::Broken,
+            Phase::Probing { .. } if !is_running || is_taken_along => Phase::Opening,
+            Phase::Probing { time_s, from } => self.go_on_probing(time_s + self.period_s, from),
             Phase::Biting { time_s } => {
                 let time_s = time_s + self.period_s;
-                let is_taken_along = self.motion_m_s.z < -SLOW_M_S && self.offsets_m[0].z >= 0.0;
                 let goes_on = is_running && time_s < self.config.bite_s && !is_taken_along;
                 if goes_on { Phase::Biting { time_s } } else { Phase::Opening }
             }
@@ -183,6 +205,35 @@ impl ForceControl {
                 if is_near && is_slow { Phase::Free } else { waiting }
             }
         }
+    }
+
+    /// The next phase of a probe. At its end the stiffness is known, and reported if it is far from the stated one.
+    fn go_on_probing(&mut self, time_s: f64, from: Option<[f64; 2]>) -> Phase {
+        let here = [self.bite_n(), self.offsets_m[0].z + self.motion_m.map_or(0.0, |motion_m| motion_m.z)];
+        let from = from.or((time_s >= PROBE_S / 2.0).then_some(here));
+        let Some([from_n, from_m]) = from.filter(|_| time_s >= PROBE_S) else {
+            return Phase::Probing { time_s, from };
+        };
+        let shown_n_per_m = self.stiffness.take_probe(here[0] - from_n, here[1] - from_m);
+        let config = &self.config;
+        let is_on_teeth = self.closed_m - here[1] < config.tooth_zone_m;
+        let stated_n_per_m =
+            if is_on_teeth { config.tooth_stiffness_n_per_m } else { config.food_stiffness_n_per_m };
+        let ratio = shown_n_per_m / stated_n_per_m;
+        let most = config.probe.map_or(f64::INFINITY, |probe| probe.factor);
+        self.notice = (ratio.max(1.0 / ratio) > most).then_some(Notice {
+            cause: Cause::WrongStiffness,
+            value: shown_n_per_m,
+            limit: stated_n_per_m,
+        });
+        Phase::Biting { time_s: 0.0 }
+    }
+
+    /// Largest speed of closing before a contact, m/s: until the loop answers to a contact, the force stays below the peak.
+    fn approach_m_s(&self) -> f64 {
+        let Some(probe) = &self.config.probe else { return f64::INFINITY };
+        let room_n = APPROACH_SHARE * (self.config.peak_n - self.config.contact_n);
+        self.stiffness.approach_m_s(room_n).unwrap_or(probe.closing_m_s)
     }
 
     /// Damping at the last requested height, N per m/s: between food and teeth by the opening of the mouth, and at least what
@@ -207,8 +258,14 @@ impl ForceControl {
         let (offset_m, damping) = (self.offsets_m[0], self.damping_n_s_per_m());
         let most_m_s = self.config.closing_m_s;
         match self.phase {
-            Phase::Free => self.motion_m_s,
-            Phase::Biting { .. } => {
+            // At the end of its reach the jaw goes as fast as the motion.
+            Phase::Free => {
+                let reached_m_s = self.motion_m_s.z - (offset_m.z + self.config.reach_m) / CATCH_UP_S;
+                let mut back_m_s = self.motion_m_s - offset_m / CATCH_UP_S;
+                back_m_s.z = back_m_s.z.min(self.approach_m_s()).max(reached_m_s);
+                back_m_s
+            }
+            Phase::Probing { .. } | Phase::Biting { .. } => {
                 let lateral_m_s = (self.desired_lateral_n() - self.lateral_n) / damping;
                 let closing_m_s = ((self.desired_n - self.bite_n()) / damping).min(most_m_s);
                 lateral_m_s.cap_magnitude(most_m_s).push(closing_m_s)
@@ -226,7 +283,8 @@ impl ForceControl {
 
     /// The next way from the motion, m.
     fn advance(&mut self) -> Result<Vec3, LawFailed> {
-        if self.phase == Phase::Free {
+        let is_free = self.phase == Phase::Free;
+        if is_free && self.offsets_m[0].norm() < NEAR_M && self.motion_m_s.z <= self.approach_m_s() {
             self.speed_m_s = self.motion_m_s;
             return Ok(Vec3::zeros());
         }
@@ -244,10 +302,10 @@ impl ForceControl {
             (self.speed_m_s.x, self.speed_m_s.y) = (self.motion_m_s.x, self.motion_m_s.y);
         }
         // Under a further press, food can push back with any force.
-        if offset_m.z < -reach_m {
+        if offset_m.z < -reach_m && !is_free {
             return Err(LawFailed);
         }
-        Ok(lateral_m.cap_magnitude(lateral_reach_m).push(offset_m.z.min(reach_m)))
+        Ok(lateral_m.cap_magnitude(lateral_reach_m).push(offset_m.z.clamp(-reach_m, reach_m)))
     }
 
     /// The way from the motion, this many cycles before the coming one, m.
@@ -265,6 +323,10 @@ impl PoseLaw for ForceControl {
         self.phase = self.next_phase(demand.state);
         self.desired_n = match self.phase {
             Phase::Biting { time_s } => desired_n(&self.config, time_s).unwrap_or(0.0),
+            Phase::Probing { from, .. } => match (from, &self.config.probe) {
+                (Some(_), Some(probe)) => probe.force_n,
+                _ => self.config.contact_n,
+            },
             Phase::Free | Phase::Opening | Phase::Broken => 0.0,
         };
         let offset_m = self.advance()?;
@@ -311,7 +373,7 @@ impl PoseLaw for ForceControl {
     fn fill_signals(&self, signals: &mut [f64]) {
         let phase = match self.phase {
             Phase::Free => 0.0,
-            Phase::Biting { .. } => 1.0,
+            Phase::Probing { .. } | Phase::Biting { .. } => 1.0,
             Phase::Opening => 2.0,
             Phase::Broken => 3.0,
         };
@@ -322,6 +384,10 @@ impl PoseLaw for ForceControl {
             .iter_mut()
             .zip(vertical.into_iter().chain(lateral))
             .for_each(|(signal, value)| *signal = value);
+    }
+
+    fn take_notice(&mut self) -> Option<Notice> {
+        self.notice.take()
     }
 
     fn branch(&self) -> Result<Box<dyn PoseLaw>, NoBranch> {

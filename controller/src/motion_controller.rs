@@ -5,7 +5,7 @@
 
 use masseter_model::geometry::{Mechanism, Pose, Twist};
 use masseter_runtime::control::{Controller, NoBranch, Outcome, Tick};
-use masseter_runtime::messages::codes::ControllerState;
+use masseter_runtime::messages::codes::{ControllerState, EventKind, Source};
 use masseter_runtime::messages::{Command, Event, Reading, State};
 use masseter_runtime::named::{Declared, Parameter};
 use masseter_scenario::Scenario;
@@ -16,7 +16,7 @@ use crate::forces::{Forces, twist_between};
 use crate::path_supervision::{PathSupervision, StartTolerance};
 use crate::playback::{Playback, Progress};
 use crate::pose_control::PoseControl;
-use crate::pose_law::{Demand, Measured, PoseLaw};
+use crate::pose_law::{Demand, Measured, Notice, PoseLaw};
 use crate::safety::Fault;
 use crate::sequencer::Sequencer;
 use crate::targets::Targets;
@@ -243,7 +243,11 @@ impl Controller for MotionController {
             self.enter_state();
         }
         self.progress.count_rest();
-        event
+        event.or_else(|| {
+            let Notice { cause, value, limit } = self.law.take_notice()?;
+            let event = Event::new(Source::Controller, EventKind::Notice, cause);
+            Some(Event { time_ns: tick.now_ns, cycle: tick.cycle, value, limit, ..event })
+        })
     }
 
     fn fill_command(&self, command: &mut Command) {

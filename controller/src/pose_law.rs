@@ -6,7 +6,11 @@
 use std::{fmt, ops::Range};
 
 use masseter_model::geometry::{AXES, Pose, Twist, Vec3};
-use masseter_runtime::{control::NoBranch, messages::codes::ControllerState, named::Declared};
+use masseter_runtime::{
+    control::NoBranch,
+    messages::codes::{Cause, ControllerState},
+    named::Declared,
+};
 use nalgebra::{Quaternion, Translation3, Unit};
 
 /// What a pose law needs of a cycle. Poses are those of the platform in the base frame, m.
@@ -79,6 +83,17 @@ impl Default for Detour {
     }
 }
 
+/// An observation of a law, for an event without a reaction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Notice {
+    /// The cause.
+    pub cause: Cause,
+    /// The value, in the cause's unit.
+    pub value: f64,
+    /// What it should be.
+    pub limit: f64,
+}
+
 /// A law gave no pose. The law's program reports the reason; the event of the safe stop has the cause `law_failed`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
 #[error("the pose law failed")]
@@ -142,6 +157,11 @@ pub trait PoseLaw: std::fmt::Debug {
 
     /// Writes the declared signals, also in cycles without a call of the law.
     fn fill_signals(&self, _signals: &mut [f64]) {}
+
+    /// What the law has observed since the last call, for the events of the run.
+    fn take_notice(&mut self) -> Option<Notice> {
+        None
+    }
 
     /// A copy of the law with its whole state. Not part of a cycle.
     ///

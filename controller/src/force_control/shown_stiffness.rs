@@ -18,6 +18,8 @@ const PERIOD_IN_DELAYS: f64 = 4.0;
 #[derive(Debug, Clone)]
 pub(super) struct ShownStiffness {
     pub(super) n_per_m: f64,
+    /// What a probe has shown; 0 before a probe.
+    probed_n_per_m: f64,
     delay_s: f64,
     /// Shares of a cycle in the low-passes of the force's source and of the loop's delay.
     source_share: f64,
@@ -43,7 +45,7 @@ impl ShownStiffness {
         let share = |time_s: f64| period_s / (period_s + time_s);
         let (source_share, delay_share) = (share(source_s), share(delay_s));
         let kept_share = 1.0 - share(PERIOD_IN_DELAYS * delay_s);
-        Self { n_per_m: 0.0, delay_s, source_share, delay_share, kept_share, slow: None }
+        Self { n_per_m: 0.0, probed_n_per_m: 0.0, delay_s, source_share, delay_share, kept_share, slow: None }
     }
 
     /// Takes the requested height at a sample (m) and the force there (N), whose changes may be wrong by `doubt_n`.
@@ -61,9 +63,25 @@ impl ShownStiffness {
         }
     }
 
-    /// Another bite begins.
+    /// Takes the end of a probe: a rise of the force (N) over a way (m) between two rests. Returns the stiffness, N/m.
+    pub(super) fn take_probe(&mut self, rise_n: f64, way_m: f64) -> f64 {
+        self.probed_n_per_m = (rise_n / way_m.max(LEAST_M)).max(1.0);
+        self.n_per_m = self.n_per_m.max(self.probed_n_per_m);
+        self.probed_n_per_m
+    }
+
+    pub(super) fn is_probed(&self) -> bool {
+        self.probed_n_per_m > 0.0
+    }
+
+    /// Another bite begins. What a probe has shown stays known.
     pub(super) fn forget(&mut self) {
-        self.n_per_m = 0.0;
+        self.n_per_m = self.probed_n_per_m;
+    }
+
+    /// Speed at which the force gains this much (N) until the loop answers, m/s; none before a probe.
+    pub(super) fn approach_m_s(&self, room_n: f64) -> Option<f64> {
+        self.is_probed().then(|| room_n / (self.probed_n_per_m * self.delay_s))
     }
 
     /// The damping that this stiffness needs, N per m/s.

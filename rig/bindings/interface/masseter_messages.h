@@ -203,6 +203,8 @@ enum masseter_cause {
     MASSETER_CAUSE_FORCE_LIMIT = 64,
     /* The motion waited too long for lost or late commands and readings (s). */
     MASSETER_CAUSE_MOTION_LATE = 65,
+    /* A bite shows another stiffness than stated (N/m; the limit is the stated one). */
+    MASSETER_CAUSE_WRONG_STIFFNESS = 66,
 };
 
 enum masseter_no_pose {
@@ -223,7 +225,7 @@ enum masseter_no_pose {
 };
 
 #define MASSETER_READING_TOPIC "reading"
-#define MASSETER_READING_TYPE_NAME "masseter/Reading/605122f0cec28ded"
+#define MASSETER_READING_TYPE_NAME "masseter/Reading/a9068e5a70343ba1"
 
 /* Positions, forces and states of the drives, once a cycle. */
 typedef struct masseter_reading {
@@ -298,7 +300,7 @@ static_assert(offsetof(masseter_reading, fresh_axes) == 256, "offset of fresh_ax
 static_assert(offsetof(masseter_reading, master_fault) == 260, "offset of master_fault");
 
 #define MASSETER_COMMAND_TOPIC "command"
-#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/56470557c10ef10b"
+#define MASSETER_COMMAND_TYPE_NAME "masseter/Command/58429641477964f3"
 
 /* Targets and request for the drives, once a cycle. */
 typedef struct masseter_command {
@@ -334,7 +336,7 @@ static_assert(offsetof(masseter_command, request) == 136, "offset of request");
 static_assert(offsetof(masseter_command, controller_state) == 140, "offset of controller_state");
 
 #define MASSETER_STATE_TOPIC "state"
-#define MASSETER_STATE_TYPE_NAME "masseter/State/a728e9829bcde2bf"
+#define MASSETER_STATE_TYPE_NAME "masseter/State/1880bb659a4ccdc7"
 
 /* The controller's state and its estimate, once a cycle. All float64 fields but `motion_time_s` have 31 significant bits. */
 typedef struct masseter_state {
@@ -421,7 +423,7 @@ static_assert(offsetof(masseter_state, iterations) == 288, "offset of iterations
 static_assert(offsetof(masseter_state, controller_state) == 292, "offset of controller_state");
 
 #define MASSETER_EVENT_TOPIC "event"
-#define MASSETER_EVENT_TYPE_NAME "masseter/Event/6745a17fbaa89fdc"
+#define MASSETER_EVENT_TYPE_NAME "masseter/Event/21ee579a9f2571a6"
 
 /* A single occurrence: a change of state, a fault, an alarm. */
 typedef struct masseter_event {
@@ -478,7 +480,7 @@ static_assert(offsetof(masseter_event, value) == 72, "offset of value");
 static_assert(offsetof(masseter_event, limit) == 80, "offset of limit");
 
 #define MASSETER_TRUTH_TOPIC "truth"
-#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/5b773950ee9a9618"
+#define MASSETER_TRUTH_TYPE_NAME "masseter/Truth/aaa6b46fe5150f32"
 
 /* The true state of the mechanism, once a cycle; the controller never reads it. All float64 fields have 31 significant bits. */
 typedef struct masseter_truth {
@@ -535,7 +537,7 @@ static_assert(offsetof(masseter_truth, kinetic_j) == 352, "offset of kinetic_j")
 static_assert(offsetof(masseter_truth, potential_j) == 360, "offset of potential_j");
 
 #define MASSETER_CONTACT_TOPIC "contact"
-#define MASSETER_CONTACT_TYPE_NAME "masseter/Contact/6f3c47a8dda10d46"
+#define MASSETER_CONTACT_TYPE_NAME "masseter/Contact/aa4988fe35a2196c"
 
 /* The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads it. All float64 fields have 31 significant bits. */
 typedef struct masseter_contact {

@@ -139,6 +139,22 @@ section! {
         pub reach_m: f64 = 0.012 => Within(0.000_001, 0.05),
         /// Control of the lateral force beside the bite force; none without the table.
         pub lateral: Option<LateralForceConfig> = None,
+        /// A probe of the stiffness before the first bite; none without the table.
+        pub probe: Option<ProbeConfig> = None,
+    }
+}
+
+section! {
+    /// The probe of the stiffness before the first bite.
+    #[derive(Copy)]
+    pub struct ProbeConfig {
+        /// Bite force to which the probe rises from `force_control.contact_n`.
+        pub force_n: f64 = 20.0 => Positive "1.2 times `force_control.contact_n` to `force_control.peak_n`",
+        /// Largest speed of closing before the stiffness is known; the jaw then stays behind the motion, by at most
+        /// `force_control.reach_m`.
+        pub closing_m_s: f64 = 0.005 => Within(0.0001, 1.0),
+        /// Ratio of the stiffness that the probe shows and the stated one, or the reverse, from which on it is reported (`wrong_stiffness`).
+        pub factor: f64 = 2.0 => Within(1.1, 100.0),
     }
 }
 
@@ -216,7 +232,12 @@ impl ForceControlConfig {
             );
             require(damping >= least && damping.is_finite(), &key, &damping, need)?;
         }
-        self.lateral.as_ref().map_or(Ok(()), |lateral| lateral.validate(self))
+        self.lateral.as_ref().map_or(Ok(()), |lateral| lateral.validate(self))?;
+        self.probe.as_ref().map_or(Ok(()), |probe| {
+            probe.check_ranges(ranges_of("force_control.probe"))?;
+            let range = Range::Within(1.2 * self.contact_n, self.peak_n);
+            require_range("force_control.probe.force_n", range, probe.force_n)
+        })
     }
 }
 

@@ -49,7 +49,7 @@ pub use faults::{
 };
 pub use force::{
     BiteProfile, ForceControlConfig, ForceEstimateConfig, ForceFusion, ForceSource, LateralForceConfig,
-    LoadCellConfig,
+    LoadCellConfig, ProbeConfig,
 };
 pub use jaw::{FoodConfig, JawConfig, MOST_PAIRS, Material, TeethConfig, ToothConfig};
 pub use masseter_model::dynamics::{AxesConfig, DynamicsConfig, FrictionConfig, FrictionModel};

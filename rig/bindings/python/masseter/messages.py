@@ -210,6 +210,8 @@ class Cause(enum.IntEnum):
     FORCE_LIMIT = 64
     #: The motion waited too long for lost or late commands and readings (s).
     MOTION_LATE = 65
+    #: A bite shows another stiffness than stated (N/m; the limit is the stated one).
+    WRONG_STIFFNESS = 66
 
 
 class NoPose(enum.IntEnum):
@@ -282,7 +284,7 @@ class Reading(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Reading/605122f0cec28ded"
+        return "masseter/Reading/a9068e5a70343ba1"
 
 
 _check(Reading, 264, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 176, 224, 232, 256, 260])
@@ -315,7 +317,7 @@ class Command(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Command/56470557c10ef10b"
+        return "masseter/Command/58429641477964f3"
 
 
 _check(Command, 144, [0, 8, 16, 24, 32, 40, 88, 136, 140])
@@ -382,7 +384,7 @@ class State(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/State/a728e9829bcde2bf"
+        return "masseter/State/1880bb659a4ccdc7"
 
 
 _check(State, 296, [0, 8, 16, 24, 32, 40, 48, 56, 64, 72, 80, 88, 96, 104, 112, 120, 128, 136, 160, 192, 216, 248, 272, 280, 288, 292])
@@ -429,7 +431,7 @@ class Event(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Event/6745a17fbaa89fdc"
+        return "masseter/Event/21ee579a9f2571a6"
 
 
 _check(Event, 88, [0, 8, 16, 24, 32, 40, 44, 48, 52, 56, 60, 62, 64, 68, 72, 80])
@@ -476,7 +478,7 @@ class Truth(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Truth/5b773950ee9a9618"
+        return "masseter/Truth/aaa6b46fe5150f32"
 
 
 _check(Truth, 368, [0, 8, 16, 24, 32, 40, 64, 96, 144, 192, 240, 288, 296, 304, 352, 360])
@@ -507,7 +509,7 @@ class Contact(ctypes.Structure):
 
     @staticmethod
     def type_name() -> str:
-        return "masseter/Contact/6f3c47a8dda10d46"
+        return "masseter/Contact/aa4988fe35a2196c"
 
 
 _check(Contact, 872, [0, 8, 16, 24, 32, 40, 104, 488])

@@ -135,7 +135,7 @@ const REPORTS: [(Source, &[Cause]); 5] = [
         causes!(
             Sequence StopRequested StaleReading DriveFault ForwardKinematics StrokeLimit VelocityLimit
             InverseKinematics ForeignCommand EnableTimeout TrackingLost OrientationLost BadMessage MasterFault
-            LawFailed ParameterSet StartTooFar ForceLimit MotionLate
+            LawFailed ParameterSet StartTooFar ForceLimit MotionLate WrongStiffness
         ),
     ),
     (

@@ -202,6 +202,8 @@ codes! {
         ForceLimit = 64 "force_limit",
         /// The motion waited too long for lost or late commands and readings (s).
         MotionLate = 65 "motion_late",
+        /// A bite shows another stiffness than stated (N/m; the limit is the stated one).
+        WrongStiffness = 66 "wrong_stiffness",
     }
 }
 

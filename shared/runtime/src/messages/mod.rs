@@ -38,7 +38,7 @@ pub const WORKS: usize = 6;
 
 messages! {
     /// Targets and request for the drives, once a cycle.
-    Command on "command" keeping 2048 as "masseter/Command/56470557c10ef10b" {
+    Command on "command" keeping 2048 as "masseter/Command/58429641477964f3" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -55,7 +55,7 @@ messages! {
     }
 
     /// Positions, forces and states of the drives, once a cycle.
-    Reading on "reading" keeping 2048 as "masseter/Reading/605122f0cec28ded" {
+    Reading on "reading" keeping 2048 as "masseter/Reading/a9068e5a70343ba1" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// Cycle of the last command received when the sample was taken; 0 before the first.
@@ -98,7 +98,7 @@ messages! {
     }
 
     /// The controller's state and its estimate, once a cycle. All float64 fields but `motion_time_s` have 31 significant bits.
-    State on "state" keeping 2048 as "masseter/State/a728e9829bcde2bf" {
+    State on "state" keeping 2048 as "masseter/State/1880bb659a4ccdc7" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// Cycle of the reading it was computed from; 0 when there was none.
@@ -152,7 +152,7 @@ messages! {
 
     /// The signals that the controller declares, once a cycle; without any, there is no such message. A recording's
     /// definition of the message has a field for each signal.
-    Signals on "signal" keeping 2048 as "masseter/Signals/07c28e64e13faf42" {
+    Signals on "signal" keeping 2048 as "masseter/Signals/51f27d062c32f9d8" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The signals, in the order of their declaration.
@@ -161,7 +161,7 @@ messages! {
 
     /// The parameters that the controller declares, in its first cycle and in each that begins with another value. A
     /// recording's definition of the message has a field for each parameter.
-    Parameters on "parameter" keeping 256 as "masseter/Parameters/ddd75b5807521d8c" {
+    Parameters on "parameter" keeping 256 as "masseter/Parameters/f30e6d2f8ce938b6" {
         /// Cycle of the controller, from 1.
         cycle: u64,
         /// The parameters, in the order of their declaration.
@@ -170,7 +170,7 @@ messages! {
 
     /// The true state of the mechanism, once a cycle; the controller never reads it. All float64 fields have 31
     /// significant bits.
-    Truth on "truth" keeping 2048 as "masseter/Truth/5b773950ee9a9618" {
+    Truth on "truth" keeping 2048 as "masseter/Truth/aaa6b46fe5150f32" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// The instant it describes: that of the reading's sample, ns.
@@ -202,7 +202,7 @@ messages! {
 
     /// The forces between the jaws, once a cycle; without teeth and food, there is no such message. The controller never reads
     /// it. All float64 fields have 31 significant bits.
-    Contact on "contact" keeping 2048 as "masseter/Contact/6f3c47a8dda10d46" {
+    Contact on "contact" keeping 2048 as "masseter/Contact/aa4988fe35a2196c" {
         /// Cycle of the plant, from 1.
         cycle: u64,
         /// End of the time that it describes: the instant of the reading's sample, ns.
@@ -216,7 +216,7 @@ messages! {
     }
 
     /// An observation of a tap on a CAN wire: a frame, or an error message in the coding of `linux/can/error.h`.
-    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/0ea2022e639f9557" {
+    FrameTap on "frame" keeping 32768 as "masseter/FrameTap/d4ebc08a4b736aef" {
         /// When its last bit was on the wire, ns.
         time_ns: u64,
         /// When its transmitter had it queued, ns; 0 on real wires.
@@ -233,7 +233,7 @@ messages! {
 
     /// Counters of the kernel for the machine and both loops. The recorder reads and records them; the message is not
     /// published.
-    Machine on "machine" keeping 1 as "masseter/Machine/249f36c19c7fc101" {
+    Machine on "machine" keeping 1 as "masseter/Machine/ea3cb9c208a0bc25" {
         /// Time of the sample, ns.
         time_ns: u64,
         /// Time that the hypervisor had taken from all cores together, as far as the hypervisor reports it, ns.
@@ -245,7 +245,7 @@ messages! {
     }
 
     /// A single occurrence: a change of state, a fault, an alarm.
-    Event on "event" keeping 1024 as "masseter/Event/6745a17fbaa89fdc" {
+    Event on "event" keeping 1024 as "masseter/Event/21ee579a9f2571a6" {
         /// When, ns.
         time_ns: u64,
         /// Cycle of the process that reports it.

@@ -23,7 +23,9 @@ fn place_of(event: &Event, interface: Option<&str>) -> String {
     let bus = interface.map_or_else(|| bus.to_string(), |name| format!("{bus}, {name}"));
     match (AXIS_NAMES.get(event.axis as usize), node) {
         _ if event.cause == Cause::LawFailed.code() => "the pose law".to_owned(),
-        _ if event.cause == Cause::ForceLimit.code() => "the bite".to_owned(),
+        _ if [Cause::ForceLimit, Cause::WrongStiffness].map(Cause::code).contains(&event.cause) => {
+            "the bite".to_owned()
+        }
         _ if event.cause == Cause::MotionLate.code() => "the motion".to_owned(),
         _ if event.cause == Cause::FoodBroke.code() => format!("tooth {}", event.object),
         (None, 0) if event.source == Source::Controller.code() => "the mechanism".to_owned(),
@@ -185,6 +187,17 @@ fn words_of_run(cause: Cause, event: &Event, interface: Option<&str>) -> Option<
         Cause::ForceLimit => format!(
             "{value:.1} N, limit {limit:.1} N; close more slowly, state the stiffness of food and teeth in [force_control], \
              or raise its overload"
+        ),
+        Cause::WrongStiffness => format!(
+            "shows {:.0} N/m, but stated are {:.0} N/m: {}; state the stiffness of food and teeth in [force_control], with a \
+             damping for it",
+            event.value,
+            event.limit,
+            if event.value > event.limit {
+                "the damping grows"
+            } else {
+                "it follows more slowly than it could"
+            }
         ),
         Cause::ForwardKinematics => format!(
             "{}; compare what the encoders count with the rig, and the rig with the scenario's [mechanism]",
