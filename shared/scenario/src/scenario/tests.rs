@@ -196,6 +196,8 @@ const WRONG: &[(&str, &str)] = &[
         "load_cell.range_n = 8.4: use more than 8.5 N",
     ),
     ("[force_control]\nsource = 'loadcell'", "did you mean 'load_cell'?"),
+    ("[force_control.probe]\nforce_n = 11.0", "force_control.probe.force_n = 11: use 12 to 30"),
+    ("[force_control.lateral]\nreach_m = 0.0", "force_control.lateral.reach_m = 0: use"),
     (
         "[load_cell]\nbandwidth_hz = 10.0\n[force_control]\nsource = 'load_cell'\ndamping_n_s_per_m = 40.0",
         "force_control.damping_n_s_per_m = 40: use at least 46.6",
