@@ -98,6 +98,8 @@ pub(crate) struct ForceControl {
     bites_n: [f64; BREAK_CYCLES],
     /// Desired bite force, N; 0 between bites.
     desired_n: f64,
+    /// Doubt in a change of the bite force, N.
+    doubt_n: f64,
     notice: Option<Notice>,
 }
 
@@ -112,7 +114,7 @@ impl ForceControl {
                 ForceSource::Estimate => f64::INFINITY,
                 ForceSource::LoadCell => scenario.load_cell.map_or(f64::INFINITY, |cell| cell.range_n),
             },
-            cell_doubt_n: CELL_DOUBT * scenario.load_cell.map_or(0.0, |cell| cell.noise_n),
+            cell_doubt_n: CELL_DOUBT * scenario.counted_cell().map_or(0.0, |cell| cell.noise_n),
             position: PoseControl::new(&scenario.controller, scenario.rate_hz),
             closed_m,
             stiffness: ShownStiffness::new(
@@ -128,6 +130,7 @@ impl ForceControl {
             lateral_n: Vector2::zeros(),
             bites_n: [0.0; BREAK_CYCLES],
             desired_n: 0.0,
+            doubt_n: f64::INFINITY,
             notice: None,
         }
     }
@@ -153,14 +156,14 @@ impl ForceControl {
         let motion_m = demand.ahead.translation.vector;
         let before_m = self.motion_m.replace(motion_m).unwrap_or(motion_m);
         self.motion_m_s = (motion_m - before_m) / self.period_s;
-        let doubt_n = match self.config.source {
-            ForceSource::Estimate => {
-                demand.external.map_or(f64::INFINITY, |external| ESTIMATE_DOUBT * external.uncertainty_n)
-            }
+        self.doubt_n = match self.config.source {
+            ForceSource::Estimate => demand.external.map_or(f64::INFINITY, |external| {
+                self.cell_doubt_n.max(ESTIMATE_DOUBT * external.uncertainty_n)
+            }),
             ForceSource::LoadCell => self.cell_doubt_n,
         };
         let at_sample_m = demand.desired.translation.z + self.detour().at_sample_m.z;
-        self.stiffness.take(at_sample_m, bite_n, doubt_n);
+        self.stiffness.take(at_sample_m, bite_n, self.doubt_n);
         if self.phase == Phase::Free && bite_n < EMPTY_SHARE * self.config.contact_n {
             self.stiffness.forget();
         }
@@ -180,6 +183,8 @@ impl ForceControl {
         let is_late = self.config.probe.is_some() || self.offsets_m[0].z >= 0.0;
         let is_taken_along = self.motion_m_s.z < -SLOW_M_S && is_late;
         match self.phase {
+            // An approach that is not at its end when the motion is must not press on.
+            Phase::Free if !is_running && self.offsets_m[0].z < -NEAR_M => Phase::Opening,
             Phase::Free => {
                 let follows = self.offsets_m[0].z < 0.0 && self.speed_m_s.z > 0.0;
                 let closes = is_running && (self.motion_m_s.z > 0.0 || follows);
@@ -200,8 +205,8 @@ impl ForceControl {
                 if goes_on { Phase::Biting { time_s } } else { Phase::Opening }
             }
             waiting => {
-                let is_near = self.offsets_m[0].norm() < NEAR_M;
-                let is_slow = (self.speed_m_s - self.motion_m_s).norm() < SLOW_M_S;
+                let is_near = self.offsets_m[0].z.abs() < NEAR_M;
+                let is_slow = (self.speed_m_s - self.motion_m_s).z.abs() < SLOW_M_S;
                 if is_near && is_slow { Phase::Free } else { waiting }
             }
         }
@@ -214,7 +219,10 @@ impl ForceControl {
         let Some([from_n, from_m]) = from.filter(|_| time_s >= PROBE_S) else {
             return Phase::Probing { time_s, from };
         };
-        let shown_n_per_m = self.stiffness.take_probe(here[0] - from_n, here[1] - from_m);
+        let Some(shown_n_per_m) = self.stiffness.take_probe(here[0] - from_n, here[1] - from_m, self.doubt_n)
+        else {
+            return Phase::Opening;
+        };
         let config = &self.config;
         let is_on_teeth = self.closed_m - here[1] < config.tooth_zone_m;
         let stated_n_per_m =
@@ -252,16 +260,22 @@ impl ForceControl {
         Vector2::from(peak_n) * (self.desired_n / self.config.peak_n)
     }
 
+    /// Velocity at which the jaw leaves its lateral way from the motion, m/s.
+    fn back_to_side_m_s(&self) -> Vector2<f64> {
+        (self.offsets_m[0].xy() / CATCH_UP_S).cap_magnitude(self.config.closing_m_s)
+    }
+
     /// The desired velocity in this phase, m/s. A lateral force moves the jaw only in a bite: later nothing holds the jaw
     /// against an error of the estimate.
     fn wanted_m_s(&self) -> Vec3 {
         let (offset_m, damping) = (self.offsets_m[0], self.damping_n_s_per_m());
         let most_m_s = self.config.closing_m_s;
+        let back_m_s = self.motion_m_s - self.back_to_side_m_s().push(offset_m.z / CATCH_UP_S);
         match self.phase {
             // At the end of its reach the jaw goes as fast as the motion.
             Phase::Free => {
                 let reached_m_s = self.motion_m_s.z - (offset_m.z + self.config.reach_m) / CATCH_UP_S;
-                let mut back_m_s = self.motion_m_s - offset_m / CATCH_UP_S;
+                let mut back_m_s = back_m_s;
                 back_m_s.z = back_m_s.z.min(self.approach_m_s()).max(reached_m_s);
                 back_m_s
             }
@@ -274,19 +288,18 @@ impl ForceControl {
                 let gives_way_m_s = (self.bite_n() - self.config.contact_n).max(0.0) / damping;
                 Vec3::new(0.0, 0.0, -gives_way_m_s.min(most_m_s))
             }
-            Phase::Opening | Phase::Broken => {
-                let back_m_s = offset_m / CATCH_UP_S;
-                self.motion_m_s - back_m_s.xy().cap_magnitude(most_m_s).push(back_m_s.z)
-            }
+            Phase::Opening | Phase::Broken => back_m_s,
         }
     }
 
     /// The next way from the motion, m.
     fn advance(&mut self) -> Result<Vec3, LawFailed> {
         let is_free = self.phase == Phase::Free;
-        if is_free && self.offsets_m[0].norm() < NEAR_M && self.motion_m_s.z <= self.approach_m_s() {
-            self.speed_m_s = self.motion_m_s;
-            return Ok(Vec3::zeros());
+        if is_free && self.offsets_m[0].z.abs() < NEAR_M && self.motion_m_s.z <= self.approach_m_s() {
+            // What a bite has left to the side fades out.
+            let back_m_s = self.back_to_side_m_s();
+            self.speed_m_s = self.motion_m_s - back_m_s.push(0.0);
+            return Ok((self.offsets_m[0].xy() - back_m_s * self.period_s).push(0.0));
         }
         let share = self.period_s / (self.period_s + ForceControlConfig::MASS_TIME_S);
         self.speed_m_s += (self.wanted_m_s() - self.speed_m_s) * share;

@@ -74,18 +74,20 @@ impl Forces {
 
     /// Refuses a bite force above the limit of the force control, or one that is no number, whatever law controls the force.
     /// During a calibration the rough force counts: a limit has no time without a force. Of a control by the estimate the drives'
-    /// force counts beside the estimate, so a cell that hides a force does not hide it from the limit.
+    /// force counts beside the estimate, so a cell that hides a force does not hide it from the limit; a controlled lateral force counts, too.
     pub(crate) fn check_bite(&self) -> Result<(), Fault> {
         let Some(control) = &self.control else { return Ok(()) };
-        let bites_n = match control.source {
+        let external = self.external();
+        let forces_n = match control.source {
             ForceSource::Estimate => [
                 self.observer.as_ref().and_then(ForceObserver::rough_bite_n),
-                self.external().map(|external| external.bite_n()),
+                external.map(|external| external.bite_n()),
+                control.lateral.and(external).map(|external| external.force_n[0].hypot(external.force_n[1])),
             ],
-            ForceSource::LoadCell => [self.load_cell_n, None],
+            ForceSource::LoadCell => [self.load_cell_n, None, None],
         };
         let limit_n = control.limit_n();
-        let beyond = bites_n.into_iter().flatten().find(|bite_n| bite_n.is_nan() || *bite_n > limit_n);
+        let beyond = forces_n.into_iter().flatten().find(|bite_n| bite_n.is_nan() || *bite_n > limit_n);
         beyond.map_or(Ok(()), |bite_n| Err(Fault::new(Cause::ForceLimit, bite_n, limit_n)))
     }
 

@@ -90,7 +90,7 @@ pub struct Notice {
     pub cause: Cause,
     /// The value, in the cause's unit.
     pub value: f64,
-    /// What it should be.
+    /// The value that it should have.
     pub limit: f64,
 }
 

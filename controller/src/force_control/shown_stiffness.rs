@@ -63,11 +63,15 @@ impl ShownStiffness {
         }
     }
 
-    /// Takes the end of a probe: a rise of the force (N) over a way (m) between two rests. Returns the stiffness, N/m.
-    pub(super) fn take_probe(&mut self, rise_n: f64, way_m: f64) -> f64 {
-        self.probed_n_per_m = (rise_n / way_m.max(LEAST_M)).max(1.0);
-        self.n_per_m = self.n_per_m.max(self.probed_n_per_m);
-        self.probed_n_per_m
+    /// Takes the end of a probe: a rise of the force (N) over a way (m) between two rests. Returns the stiffness, N/m; none where
+    /// the rise is within its doubt or the way shows no stiffness.
+    pub(super) fn take_probe(&mut self, rise_n: f64, way_m: f64, doubt_n: f64) -> Option<f64> {
+        let shows = rise_n > doubt_n && way_m > LEAST_M;
+        shows.then(|| {
+            self.probed_n_per_m = rise_n / way_m;
+            self.n_per_m = self.n_per_m.max(self.probed_n_per_m);
+            self.probed_n_per_m
+        })
     }
 
     pub(super) fn is_probed(&self) -> bool {
@@ -118,6 +122,17 @@ mod tests {
         }
         assert!(shown_n_per_m(20.0, 12.0) > 1.0);
         assert!(shown_n_per_m(20.0, 20.0) < 1.0);
+    }
+
+    #[test]
+    fn a_probe_without_a_clear_rise_and_way_shows_nothing() {
+        let mut shown = ShownStiffness::new(1e-3, 3e-3, 8e-3);
+        for (rise_n, way_m) in [(1.2, 1e-3), (-5.0, 1e-3), (10.0, 4e-6), (10.0, -1e-3), (f64::NAN, 1e-3)] {
+            assert_eq!(shown.take_probe(rise_n, way_m, 1.3), None, "{rise_n} N, {way_m} m");
+            assert!(!shown.is_probed() && shown.approach_m_s(15.0).is_none());
+        }
+        assert_eq!(shown.take_probe(10.0, 2e-3, 1.3), Some(5000.0));
+        assert_eq!(shown.approach_m_s(15.0), Some(15.0 / (5000.0 * 8e-3)));
     }
 
     #[test]

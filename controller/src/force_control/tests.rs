@@ -1,6 +1,6 @@
 //! The law against food in a world without turns: drives two cycles late, and a low-pass as the observer.
 
-use masseter_scenario::{LateralForceConfig, LoadCellConfig};
+use masseter_scenario::{LateralForceConfig, LoadCellConfig, ProbeConfig};
 
 use super::*;
 use crate::pose_law::ExternalForce;
@@ -18,6 +18,7 @@ const END_S: f64 = 2.0 * MOVE_S + CLOSED_S;
 /// A bite on food.
 struct World {
     law: ForceControl,
+    state: ControllerState,
     cycle: u64,
     /// Requested positions, the newest last, m; the closed mouth is at 0.
     asked_m: Vec<Vec3>,
@@ -39,6 +40,7 @@ impl World {
     fn new(config: ForceControlConfig) -> Self {
         Self {
             law: ForceControl::new(&Scenario::default(), config, 0.0),
+            state: ControllerState::Running,
             cycle: 0,
             asked_m: vec![-OPENING_M * Vec3::z(); LEAD_CYCLES],
             bites_n: Vec::new(),
@@ -75,7 +77,7 @@ impl World {
         let asked = self.law.command(&Demand {
             cycle: self.cycle,
             period_s: PERIOD_S,
-            state: ControllerState::Running,
+            state: self.state,
             motion_time_s: time_s,
             desired: pose(time_s),
             estimated: None,
@@ -241,6 +243,19 @@ fn a_load_cell_that_stays_at_the_end_of_its_range_ends_the_bite() {
         world.cell_ends_n = [shown_n; 2];
         assert_eq!(world.step(), Ok(()));
     }
+}
+
+/// Nothing would begin force control at a contact after the motion.
+#[test]
+fn an_approach_that_is_not_at_its_end_when_the_motion_is_goes_no_further() {
+    let mut world = World::new(ForceControlConfig { probe: Some(ProbeConfig::default()), ..hold() });
+    world.run_to(MOVE_S + 0.05);
+    let held_m = world.asked_m.last().unwrap().z;
+    assert!((-0.012..-0.011).contains(&held_m), "the jaw is behind a closed motion: {held_m}");
+    world.state = ControllerState::Holding;
+    world.run_to(MOVE_S + CLOSED_S - 0.05);
+    let now_m = world.asked_m.last().unwrap().z;
+    assert!(now_m - held_m < 5e-5 && world.bites_n.iter().all(|bite_n| *bite_n == 0.0), "{held_m} {now_m}");
 }
 
 /// A held bite on food that leans: pressed, it pushes the jaw along x.

@@ -418,10 +418,11 @@ impl Master {
                 // such a drive.
                 let is_past = emergency.is_reset() || drive.boot.phase == BootPhase::Waiting;
                 drive.emergency = emergency.code;
-                let has_lost_master = emergency.code == EmergencyCode::HEARTBEAT && drive.is_ready();
+                let is_enabled = drive.drive_state() == Some(DriveState::OperationEnabled);
                 self.events.add(time_ns, Subject::Axis(axis), events::emergency(emergency, is_past));
                 // Such a drive stops by itself and mostly leaves the process data, so no statusword shows the stop.
-                if has_lost_master {
+                let has_lost_master = emergency.code == EmergencyCode::HEARTBEAT && is_enabled;
+                if has_lost_master && self.request() == DriveRequest::Enable {
                     let failure = Failure::with(Cause::Emergency, emergency.code.0, emergency.register);
                     self.fail(time_ns, Subject::Axis(axis), &failure);
                 }

@@ -81,7 +81,8 @@ impl Supervision {
                 | Cause::DriveFault
                 | Cause::FollowingError
                 | Cause::NotReady
-                | Cause::NotEnabled => Stop::Permanent,
+                | Cause::NotEnabled
+                | Cause::Emergency => Stop::Permanent,
                 _ => Stop::UntilRestored,
             };
         }

@@ -1,7 +1,7 @@
 //! The pose that the jaw should have at each sample, and by how much the motion is late.
 //!
-//! While the motion plays, the pose is the scenario's, computed here; with force control its height, and with lateral control its
-//! position, follows the controller's within the reach. The motion begins with the first sample in which the controller says `running`, but no later than its
+//! While the motion plays, the pose is the scenario's, computed here. With force control its height follows the controller's within
+//! the reach; with lateral control its position does while something is between the teeth. The motion begins with the first sample in which the controller says `running`, but no later than its
 //! [lead-in](StateOrder) allows. It goes on by a period with each cycle, but for those that the controller's loop lost. A
 //! controller waits where commands or readings are lost: its motion is then
 //! late, and the pose here is as late, up to the limit of `checks`. What was late stays late, but for what cycles without
@@ -37,6 +37,8 @@ pub(crate) struct Progress<'a> {
     pub(crate) next_use: Option<&'a State>,
     /// Whether that is this sample.
     pub(crate) is_used: bool,
+    /// Whether the truth has nothing between the teeth.
+    pub(crate) is_open: bool,
     pub(crate) parameters: Option<&'a Parameters>,
 }
 
@@ -186,7 +188,9 @@ impl Reference {
         if let Some(stated) = of.next_use.filter(|_| of.is_used && self.reach_m > 0.0).and_then(desired_pose)
         {
             let detour_m = stated.translation.vector - pose.translation.vector;
-            let lateral_m = detour_m.xy().cap_magnitude(self.lateral_reach_m);
+            // Nothing pushes an open jaw to a side: what is left of a bite may only become less.
+            let most_m = if of.is_open { self.detour_m.xy().norm() } else { self.lateral_reach_m };
+            let lateral_m = detour_m.xy().cap_magnitude(most_m.min(self.lateral_reach_m));
             self.detour_m = lateral_m.push(detour_m.z.clamp(-self.reach_m, self.reach_m));
         }
         pose.translation.vector += self.detour_m;

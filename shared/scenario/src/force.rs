@@ -46,8 +46,14 @@ section! {
 }
 
 impl ForceEstimateConfig {
-    /// Refuses a fusion without a cell, or with one that it cannot tare or trust.
-    pub(super) fn require_fusible(&self, cell: Option<&LoadCellConfig>, is_emulated: bool) -> Checked {
+    /// Refuses a fusion without a cell, or with one that it cannot tare or trust. The range must exceed the peak (N) of a controlled
+    /// bite: at the end of the range the force would jump to that of the drives.
+    pub(super) fn require_fusible(
+        &self,
+        cell: Option<&LoadCellConfig>,
+        is_emulated: bool,
+        peak_n: f64,
+    ) -> Checked {
         if self.fusion == ForceFusion::None {
             return Ok(());
         }
@@ -57,9 +63,10 @@ impl ForceEstimateConfig {
         require(self.calibration_s > 0.0, "force_estimate.calibration_s", &self.calibration_s, need)?;
         let need = "use the noise of the cell: the fusion weights the cell by it, and without noise a cell that sticks looks sound";
         require(noise_n > 0.0, "load_cell.noise_n", &noise_n, need)?;
-        let least_range_n = offset_n.abs() + 5.0 * noise_n;
+        let least_range_n = 1.2 * peak_n + offset_n.abs() + 5.0 * noise_n;
         let need = format!(
-            "use more than {least_range_n} N, offset and five times the noise: this cell is at an end without a load"
+            "use more than {least_range_n} N, offset and five times the noise, and 1.2 times the peak of a controlled bite: \
+             this cell comes to the end of its range"
         );
         require(range_n > least_range_n, "load_cell.range_n", &range_n, need)
     }
@@ -235,7 +242,12 @@ impl ForceControlConfig {
         self.lateral.as_ref().map_or(Ok(()), |lateral| lateral.validate(self))?;
         self.probe.as_ref().map_or(Ok(()), |probe| {
             probe.check_ranges(ranges_of("force_control.probe"))?;
-            let range = Range::Within(1.2 * self.contact_n, self.peak_n);
+            let least_n = 1.2 * self.contact_n;
+            let need = format!(
+                "use at least {least_n} N, 1.2 times the force of contact: a probe lies between the two"
+            );
+            require(self.peak_n >= least_n, "force_control.peak_n", &self.peak_n, need)?;
+            let range = Range::Within(least_n, self.peak_n);
             require_range("force_control.probe.force_n", range, probe.force_n)
         })
     }

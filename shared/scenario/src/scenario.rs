@@ -19,8 +19,9 @@ use super::when::{EntryNames, refuse_circles};
 use super::{
     AxisScale, CanConfig, ChecksConfig, ControllerConfig, DriveProfile, DrivesConfig, DryConfig,
     DynamicsConfig, ExpectConfig, FaultConfig, FoodConfig, ForceControlConfig, ForceEstimateConfig,
-    ForceSource, JawConfig, LoadCellConfig, MotionConfig, RealtimeConfig, RecordingConfig, RequirementConfig,
-    StimulusConfig, StudyConfig, TeethConfig, ToothConfig, TrajectoryLimitsConfig, dynamics,
+    ForceFusion, ForceSource, JawConfig, LoadCellConfig, MotionConfig, RealtimeConfig, RecordingConfig,
+    RequirementConfig, StimulusConfig, StudyConfig, TeethConfig, ToothConfig, TrajectoryLimitsConfig,
+    dynamics,
 };
 use crate::input::{excerpt, read_text};
 use crate::wording::nearest;
@@ -385,6 +386,13 @@ impl Scenario {
         self.expect.as_ref().map_or(Ok(()), ExpectConfig::validate)
     }
 
+    /// The load cell, where the estimate or the control of the bite force uses it.
+    pub fn counted_cell(&self) -> Option<&LoadCellConfig> {
+        let is_fused = self.force_estimate.is_some_and(|estimate| estimate.fusion == ForceFusion::LoadCell);
+        let is_source = self.force_control.is_some_and(|control| control.source == ForceSource::LoadCell);
+        self.load_cell.as_ref().filter(|_| is_fused || is_source)
+    }
+
     /// Checks load cell, estimate and control of the bite force.
     fn validate_forces(&self) -> Checked {
         let estimate = self.force_estimate.unwrap_or_default();
@@ -394,7 +402,8 @@ impl Scenario {
             let need = "leave the table away with can.interfaces: the rig reads no load cell there";
             require(self.can.is_virtual(), "load_cell", &"given", need)?;
         }
-        estimate.require_fusible(self.load_cell.as_ref(), self.can.is_virtual())?;
+        let peak_n = self.force_control.map_or(0.0, |control| control.peak_n);
+        estimate.require_fusible(self.load_cell.as_ref(), self.can.is_virtual(), peak_n)?;
         if let Some(control) = &self.force_control {
             let cell = control.cell(self.load_cell.as_ref(), self.can.is_virtual())?;
             control.validate(self.lead_s(), self.source_s(control))?;

@@ -161,6 +161,18 @@ fn a_drive_that_has_lost_the_master_stops_the_others_by_its_emergency() {
     assert_eq!((stop.axis, stop.value, stop.limit), (3, f64::from(0x8130), 17.0));
 }
 
+/// Such a drive is off, and moves nothing.
+#[test]
+fn a_lost_master_is_no_fault_of_drives_that_are_off() {
+    let mut bench = Bench::enabled();
+    bench.cycles(300, DriveRequest::Off);
+    let (now_ns, id) = (bench.now_ns(), bench.drive(3).id);
+    let silent = Emergency { code: EmergencyCode::HEARTBEAT, register: 0x11, vendor: [0; 5] };
+    bench.wires.wire(1).arrive(now_ns, silent.frame(id));
+    bench.cycle(Some(DriveRequest::Off));
+    assert_eq!(bench.reading.master_fault, 0);
+}
+
 /// A drive that missed the heartbeat of an earlier rig may report the loss only now.
 #[test]
 fn an_emergency_before_the_boot_up_is_no_fault_of_this_rig() {

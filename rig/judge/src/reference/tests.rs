@@ -4,6 +4,7 @@ use masseter_recording::Recorded;
 use masseter_runtime::messages::codes::{ControllerState, DriveState, EventKind, Source};
 use masseter_runtime::messages::{Command, Event, Reading, Truth};
 use masseter_runtime::named::Parameter;
+use masseter_scenario::{ForceControlConfig, LateralForceConfig};
 
 use super::*;
 use crate::{Analysis, Figures};
@@ -39,6 +40,7 @@ fn desired(reference: &mut Reference, states: &[Option<State>]) -> Vec<Desired> 
             state: Some(ControllerState::Running.code()),
             next_use: states[place..].iter().flatten().next(),
             is_used: used.is_some(),
+            is_open: false,
             parameters: None,
         })
     };
@@ -142,6 +144,7 @@ fn a_stop_by_request_and_a_slower_rate_are_taken_over() {
             state,
             next_use: None,
             is_used: false,
+            is_open: false,
             parameters: Some(&parameters),
         };
         last = slow.advance(&progress);
@@ -165,6 +168,7 @@ fn before_the_motion_and_in_an_own_one_the_controllers_pose_counts_and_after_it_
             state,
             next_use,
             is_used: true,
+            is_open: false,
             parameters: None,
         })
     };
@@ -306,6 +310,7 @@ fn a_motion_begins_at_the_end_of_the_lead_in_at_the_latest() {
                 state: Some(state.code()),
                 next_use: Some(used),
                 is_used: true,
+                is_open: false,
                 parameters: None,
             })
         };
@@ -341,6 +346,7 @@ fn a_controller_scales_its_motion_only_by_order() {
                 state: Some(ControllerState::Running.code()),
                 next_use: None,
                 is_used: false,
+                is_open: false,
                 parameters: Some(&values),
             })
         };
@@ -410,6 +416,7 @@ fn cycles_that_a_loop_lost_are_no_lag() {
             state,
             next_use,
             is_used,
+            is_open: false,
             parameters: None,
         });
         if is_used {
@@ -417,4 +424,37 @@ fn cycles_that_a_loop_lost_are_no_lag() {
         }
     }
     assert!(last.lag_s.unwrap() < 1e-6, "{last:?}");
+}
+
+/// A controller that leads the jaw aside in a bite, and one that does so with an open mouth and states the place as desired.
+#[test]
+fn a_lateral_detour_counts_only_while_something_is_between_the_teeth() {
+    let motion = motion();
+    let force_control = ForceControlConfig {
+        lateral: Some(LateralForceConfig { reach_m: 0.005, ..LateralForceConfig::default() }),
+        ..ForceControlConfig::default()
+    };
+    let scenario = Scenario { force_control: Some(force_control), ..scenario() };
+    for (is_open, expected_m) in [(false, 0.003), (true, 0.0)] {
+        let mut reference = Reference::new(&scenario, &Declared::default());
+        let mut last = Desired::default();
+        for cycle in 1..=100_u32 {
+            let mut aside = state(&motion, f64::from(cycle - 1) * PERIOD_S);
+            aside.desired_position_m[1] += 0.003;
+            last = reference.advance(&Progress {
+                cycle: cycle.into(),
+                has_sync: true,
+                has_run: true,
+                reading: None,
+                is_disturbed: false,
+                state: Some(ControllerState::Running.code()),
+                next_use: Some(&aside),
+                is_used: true,
+                is_open,
+                parameters: None,
+            });
+        }
+        let moved_m = apart_m(&last, &motion, 99.0 * PERIOD_S);
+        assert!((moved_m - expected_m).abs() < 1e-6, "{is_open}: {moved_m}");
+    }
 }

@@ -145,7 +145,7 @@ const REPORTS: [(Source, &[Cause]); 5] = [
             BadMessage HeartbeatLost ProcessDataLost BusRefused BusOff BootTimeout Overflow WrongIdentity
             WrongPdo NotAccepted SdoAborted SdoTimeout DuplicateNode NodeRestarted FaultAtStart NodeStopped
             Recovered WrongLength UnknownNode SecondMaster StillPowered HomeOffset WrongObject NotKept
-            WrongUnit FaultFound FaultReset WaitsForDrive NotReady NotEnabled
+            WrongUnit FaultFound FaultReset WaitsForDrive NotReady NotEnabled Emergency
         ),
     ),
     (Source::Drive, causes!(Sequence Emergency)),

@@ -247,6 +247,7 @@ impl Timeline {
             is_disturbed: messages.is_disturbed && messages.state.is_some_and(|state| state.worked_ns > 0),
             next_use: used.map_or_else(|| soon().next()?.state.as_ref(), |cycle| cycle.solution.as_ref()),
             is_used: messages.solution.is_some(),
+            is_open: messages.truth.is_some_and(|truth| truth.bite_force_n <= 0.0),
             parameters: messages.parameters.as_ref(),
         });
         // What disturbed the next cycle that the controller ran acts on those that it lost.

@@ -62,7 +62,7 @@ fn drives_n_per_m(scenario: &Scenario, mechanism: &Mechanism, closed: &Pose) -> 
 }
 
 /// Vertical force by requested height of the platform, N/m, for contacts of this stiffness on these teeth. With lateral control the
-/// largest of all directions: a contact that does not slide is as stiff to the side.
+/// largest along x, y and z: a contact that does not slide is as stiff to the side.
 ///
 /// With the stiffness C of the contacts and D of the drives, the request z meets C (C + D)⁻¹ D z.
 fn with_n_per_m(
