@@ -184,7 +184,9 @@ impl ForceControl {
         let is_taken_along = self.motion_m_s.z < -SLOW_M_S && is_late;
         match self.phase {
             // An approach that is not at its end when the motion is must not press on.
-            Phase::Free if !is_running && self.offsets_m[0].z < -NEAR_M => Phase::Opening,
+            Phase::Free if state == ControllerState::Holding && self.offsets_m[0].z < -NEAR_M => {
+                Phase::Opening
+            }
             Phase::Free => {
                 let follows = self.offsets_m[0].z < 0.0 && self.speed_m_s.z > 0.0;
                 let closes = is_running && (self.motion_m_s.z > 0.0 || follows);
