@@ -180,8 +180,8 @@ impl ForceControl {
     fn next_phase(&mut self, state: ControllerState) -> Phase {
         let is_running = state == ControllerState::Running;
         // A bite that a slow approach delayed ends with the motion: its turns would press on.
-        let is_late = self.config.probe.is_some() || self.offsets_m[0].z >= 0.0;
-        let is_taken_along = self.motion_m_s.z < -SLOW_M_S && is_late;
+        let may_end = self.config.probe.is_some() || self.offsets_m[0].z >= 0.0;
+        let is_taken_along = self.motion_m_s.z < -SLOW_M_S && may_end;
         match self.phase {
             // An approach that is not at its end when the motion is must not press on.
             Phase::Free if state == ControllerState::Holding && self.offsets_m[0].z < -NEAR_M => {

@@ -195,7 +195,12 @@ const WRONG: &[(&str, &str)] = &[
         "[load_cell]\noffset_n = -8.0\nrange_n = 8.4\n[force_estimate]\nfusion = 'load_cell'\ncalibration_s = 1.0",
         "load_cell.range_n = 8.4: use more than 8.5 N",
     ),
+    (
+        "[load_cell]\nrange_n = 30.0\n[force_control]\n[force_estimate]\nfusion = 'load_cell'\ncalibration_s = 1.0",
+        "load_cell.range_n = 30: use more than 36.5 N",
+    ),
     ("[force_control]\nsource = 'loadcell'", "did you mean 'load_cell'?"),
+    ("[force_control]\npeak_n = 11.0\n[force_control.probe]", "force_control.peak_n = 11: use at least 12 N"),
     ("[force_control.probe]\nforce_n = 11.0", "force_control.probe.force_n = 11: use 12 to 30"),
     ("[force_control.lateral]\nreach_m = 0.0", "force_control.lateral.reach_m = 0: use"),
     (
