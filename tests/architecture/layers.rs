@@ -168,8 +168,8 @@ pub(super) struct Room<'a> {
 pub(super) const ROOMS: [Room<'_>; 3] = [
     Room {
         folder: "plant/src/simulator/mechanism",
-        // The messages of the runtime alone.
-        crates: &["masseter_model", "masseter_runtime"],
+        // Of the runtime the messages alone, of the scenario teeth and food alone.
+        crates: &["masseter_model", "masseter_runtime", "masseter_scenario"],
         rooms: &["plant/src/error.rs", "plant/src/state.rs"],
     },
     Room {

@@ -12,45 +12,9 @@ use std::sync::Arc;
 
 use arrayvec::ArrayVec;
 use masseter_model::geometry::Vec3;
+use masseter_scenario::{FoodConfig, MOST_PAIRS, Material};
 
-use super::teeth::{Friction, Grip, MOST_PAIRS, Touch, contact_force_n};
-
-/// The material of a food.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub(crate) enum Material {
-    /// The food flows at its strength, and stays flat until its collection.
-    Yielding,
-    /// The food breaks at its strength. Its fragments flow at a share of the strength.
-    Brittle,
-    /// A spring beside a spring with a damper. The food regains its shape.
-    Viscoelastic,
-}
-
-/// The properties of a piece of food.
-#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
-pub(crate) struct Foodstuff {
-    /// The lower teeth that it lies on, by their FDI numbers. They carry it in equal shares.
-    pub(crate) teeth: Vec<u8>,
-    pub(crate) material: Material,
-    /// Thickness of a fresh piece, and the one below which it is swallowed, m.
-    pub(crate) thickness_m: f64,
-    pub(crate) swallowed_m: f64,
-    /// Share of its thickness that it keeps from one chew to the next.
-    pub(crate) left_by_chew: f64,
-    /// Elastic force by compression at full compression, N/m, and the exponent of the compression in it.
-    pub(crate) stiffness_n_per_m: f64,
-    pub(crate) exponent: f64,
-    /// Damping of Hunt and Crossley, s/m.
-    pub(crate) damping_s_per_m: f64,
-    /// Elastic force at which it flows or breaks, N, and the share of it that fragments keep.
-    pub(crate) strength_n: f64,
-    pub(crate) residual: f64,
-    /// The spring that relaxes, N/m, and in which time, s.
-    pub(crate) relaxing_n_per_m: f64,
-    pub(crate) relaxation_s: f64,
-    /// Largest lateral force on a tooth, as a share of the normal one.
-    pub(crate) friction: f64,
-}
+use super::teeth::{Friction, Grip, Touch, contact_force_n};
 
 /// A break of a piece of food between the teeth.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -67,7 +31,7 @@ pub(crate) struct FoodBreak {
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Food {
     /// Shared, so that another serving of the food allocates nothing.
-    pub(crate) config: Arc<Foodstuff>,
+    pub(crate) config: Arc<FoodConfig>,
     pub(super) columns: ArrayVec<Column, MOST_PAIRS>,
     /// Thickness that the piece has when it is collected, m.
     pub(super) collected_m: f64,
@@ -90,7 +54,7 @@ pub(super) struct Column {
 
 impl Food {
     /// A fresh piece on teeth of an arch, given by their numbers. Teeth that the arch lacks carry nothing.
-    pub(crate) fn new(config: Foodstuff, arch: &[u8]) -> Self {
+    pub(crate) fn new(config: &FoodConfig, arch: &[u8]) -> Self {
         let pair = |number: &u8| arch.iter().position(|tooth| tooth == number);
         let column = |pair| Column {
             pair,
@@ -102,7 +66,7 @@ impl Food {
         Self {
             columns: config.teeth.iter().filter_map(pair).map(column).take(MOST_PAIRS).collect(),
             collected_m: config.thickness_m,
-            config: Arc::new(config),
+            config: Arc::new(config.clone()),
             is_chewed: false,
             is_broken: false,
         }
@@ -146,7 +110,7 @@ impl Food {
 
     /// Breaks a whole, brittle piece whose elastic force reaches its strength.
     fn break_at(&mut self, elastic_n: f64) -> Option<FoodBreak> {
-        let Foodstuff { material, strength_n, .. } = *self.config;
+        let FoodConfig { material, strength_n, .. } = *self.config;
         if material != Material::Brittle || self.is_broken || elastic_n < strength_n {
             return None;
         }
@@ -157,7 +121,7 @@ impl Food {
 
     /// Flattens columns beyond the strength of a material that flows.
     fn give_way(&mut self, touches: &[Touch]) {
-        let Foodstuff { material, strength_n, .. } = *self.config;
+        let FoodConfig { material, strength_n, .. } = *self.config;
         let is_whole_and_brittle = material == Material::Brittle && !self.is_broken;
         if material == Material::Viscoelastic || is_whole_and_brittle {
             return;
@@ -174,7 +138,7 @@ impl Food {
 
     fn push(&mut self, touches: &[Touch], forces_n: &mut [Vec3]) {
         let columns = self.columns.len() as f64;
-        let Foodstuff { material, damping_s_per_m, strength_n, relaxing_n_per_m, .. } = *self.config;
+        let FoodConfig { material, damping_s_per_m, strength_n, relaxing_n_per_m, .. } = *self.config;
         let friction = Friction {
             coefficient: self.config.friction,
             stiffness_n_per_m: self.config.stiffness_n_per_m / columns,
@@ -198,14 +162,14 @@ impl Food {
     /// (compression / t)ⁿ, with the thickness t of a fresh piece. So a thinner piece carries less until the teeth meet,
     /// as in the course of chewing.
     fn stiffness_n_per_m(&self, compression_m: f64) -> f64 {
-        let Foodstuff { thickness_m, stiffness_n_per_m, exponent, .. } = *self.config;
+        let FoodConfig { thickness_m, stiffness_n_per_m, exponent, .. } = *self.config;
         let stiffness_n_per_m = self.share() * stiffness_n_per_m / self.columns.len() as f64;
         stiffness_n_per_m * (compression_m / thickness_m).powf(exponent - 1.0)
     }
 
     /// The compression of a column under an elastic force, m.
     fn compression_of(&self, elastic_n: f64) -> f64 {
-        let Foodstuff { thickness_m, stiffness_n_per_m, exponent, .. } = *self.config;
+        let FoodConfig { thickness_m, stiffness_n_per_m, exponent, .. } = *self.config;
         let whole_n = self.share() * stiffness_n_per_m / self.columns.len() as f64 * thickness_m;
         thickness_m * (elastic_n / whole_n).powf(1.0 / exponent)
     }

@@ -4,7 +4,7 @@
 //! shorter than the fastest oscillation of the mechanism on its contacts allows.
 
 pub(crate) mod food;
-pub(crate) mod teeth;
+mod teeth;
 
 #[cfg(test)]
 mod tests;
@@ -13,11 +13,12 @@ use arrayvec::ArrayVec;
 use masseter_model::dynamics::DynamicsConfig;
 use masseter_model::geometry::{Pose, Twist, Vec3};
 use masseter_runtime::messages::Contact;
+use masseter_scenario::{MOST_PAIRS, TeethConfig, ToothConfig};
 use nalgebra::{Matrix6, Vector6};
 
 use crate::error::ContactError;
 use food::{Food, FoodBreak};
-use teeth::{Enamel, MOST_PAIRS, Pair, Tooth};
+use teeth::{Enamel, Pair};
 
 /// The contact between the jaws.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
@@ -41,11 +42,11 @@ pub(crate) struct Occlusion {
 impl Occlusion {
     /// Teeth for a mouth that is closed in that pose of the platform, each with the stiffest contact that it may have (N/m).
     /// Without enamel they meet food alone.
-    pub(crate) fn new(teeth: &[(Tooth, f64)], enamel: Option<&Enamel>, closed: &Pose) -> Self {
+    pub(crate) fn new(teeth: &[(ToothConfig, f64)], enamel: Option<&TeethConfig>, closed: &Pose) -> Self {
         let teeth = &teeth[..teeth.len().min(MOST_PAIRS)];
         let pairs: ArrayVec<_, MOST_PAIRS> =
             teeth.iter().map(|(tooth, _)| Pair::new(tooth, closed)).collect();
-        let enamel = enamel.into_iter().flat_map(|enamel| pairs.iter().map(|_| enamel.clone())).collect();
+        let enamel = enamel.into_iter().flat_map(|teeth| pairs.iter().map(|_| Enamel::new(teeth))).collect();
         let mut stiffness = Matrix6::zeros();
         for (pair, (_, stiffest_n_per_m)) in pairs.iter().zip(teeth) {
             let jacobian = pair.jacobian(closed);

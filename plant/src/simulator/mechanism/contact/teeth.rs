@@ -10,21 +10,8 @@
 //! speed.
 
 use masseter_model::geometry::{Pose, Twist, Vec3};
+use masseter_scenario::{TeethConfig, ToothConfig};
 use nalgebra::{Matrix3x6, Point3};
-
-/// Room for the contact of this many pairs of teeth: all lower ones.
-pub(crate) const MOST_PAIRS: usize = 16;
-
-/// A lower tooth.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Tooth {
-    /// Its FDI number.
-    pub(crate) number: u8,
-    /// Place of the contact with its antagonist in the closed mouth, platform frame, m.
-    pub(crate) point_m: [f64; 3],
-    /// Normal of the face on which they meet, from the lower tooth to its antagonist, platform frame of the closed mouth.
-    pub(crate) normal: [f64; 3],
-}
 
 /// The pair.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
@@ -60,7 +47,7 @@ pub(super) struct Touch {
 
 impl Pair {
     /// A tooth and its antagonist in a mouth that is closed in that pose of the platform.
-    pub(super) fn new(tooth: &Tooth, closed: &Pose) -> Self {
+    pub(super) fn new(tooth: &ToothConfig, closed: &Pose) -> Self {
         Self {
             number: tooth.number,
             lower_m: Vec3::from(tooth.point_m),
@@ -91,20 +78,34 @@ impl Pair {
 
 /// The contact of a pair of teeth.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
-pub(crate) struct Enamel {
+pub(super) struct Enamel {
     /// Distance of the teeth in the closed mouth, m.
-    pub(crate) clearance_m: f64,
+    clearance_m: f64,
     /// Stiffness of a tooth in its ligament under forces up to `soft_up_to_n` (N), and under larger ones, N/m.
-    pub(crate) soft_n_per_m: f64,
-    pub(crate) soft_up_to_n: f64,
-    pub(crate) stiff_n_per_m: f64,
+    soft_n_per_m: f64,
+    soft_up_to_n: f64,
+    stiff_n_per_m: f64,
     /// Damping of Hunt and Crossley, s/m.
-    pub(crate) damping_s_per_m: f64,
-    pub(crate) friction: Friction,
-    pub(crate) grip: Grip,
+    damping_s_per_m: f64,
+    friction: Friction,
+    grip: Grip,
 }
 
 impl Enamel {
+    /// A contact that nothing touches yet.
+    pub(super) fn new(teeth: &TeethConfig) -> Self {
+        let stiff_n_per_m = teeth.stiff_n_per_m;
+        Self {
+            clearance_m: teeth.clearance_m,
+            soft_n_per_m: teeth.soft_n_per_m,
+            soft_up_to_n: teeth.soft_up_to_n,
+            stiff_n_per_m,
+            damping_s_per_m: teeth.damping_s_per_m,
+            friction: Friction { coefficient: teeth.friction, stiffness_n_per_m: stiff_n_per_m },
+            grip: Grip::default(),
+        }
+    }
+
     /// The force on the lower tooth, base axes, N.
     pub(super) fn force_n(&mut self, touch: &Touch) -> Vec3 {
         let elastic_n = self.elastic_n(-touch.gap_m - self.clearance_m);
@@ -124,16 +125,16 @@ impl Enamel {
 
 /// The friction of a contact.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
-pub(crate) struct Friction {
+pub(super) struct Friction {
     /// Largest lateral force as a share of the normal one.
-    pub(crate) coefficient: f64,
+    pub(super) coefficient: f64,
     /// Stiffness of the faces along each other, N/m.
-    pub(crate) stiffness_n_per_m: f64,
+    pub(super) stiffness_n_per_m: f64,
 }
 
 /// The hold of a lower tooth on the other face.
 #[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
-pub(crate) struct Grip {
+pub(super) struct Grip {
     /// Place of the slack spring, base frame, m; none without contact.
     anchor_m: Option<Vec3>,
 }
@@ -169,7 +170,7 @@ mod enamel_tests {
 
     #[test]
     fn a_tooth_is_soft_up_to_4_n_and_then_ten_times_stiffer() {
-        let enamel = Enamel::from(&TeethConfig::default());
+        let enamel = Enamel::new(&TeethConfig::default());
         for (compression_um, expected_n) in [(-5.0, 0.0), (10.0, 2.0), (20.0, 4.0), (30.0, 24.0)] {
             let found_n = enamel.elastic_n(compression_um * 1e-6);
             assert!((found_n - expected_n).abs() < 1e-9, "{found_n} N at {compression_um} µm");

@@ -1,6 +1,6 @@
 //! Laws of the contact between the jaws.
 
-use masseter_scenario::{FoodConfig, Scenario, TeethConfig, ToothConfig};
+use masseter_scenario::{FoodConfig, Scenario};
 use nalgebra::{Matrix3, Vector3};
 
 use super::*;

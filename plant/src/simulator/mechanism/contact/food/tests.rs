@@ -1,7 +1,5 @@
 //! The behaviour of foods, bite after bite.
 
-use masseter_scenario::FoodConfig;
-
 use super::*;
 
 const STEP_S: f64 = 1e-5;
@@ -29,7 +27,7 @@ struct Bite {
 
 impl Bite {
     fn new(config: &FoodConfig) -> Self {
-        Self { food: Food::new(config.into(), &[36]), broke: Vec::new() }
+        Self { food: Food::new(config, &[36]), broke: Vec::new() }
     }
 
     /// The force at a gap while the gap shrinks at a speed, N.
@@ -168,7 +166,7 @@ fn no_chew_of_any_food_gives_more_work_than_it_takes() {
 #[test]
 fn several_teeth_share_a_piece_by_place() {
     let config = FoodConfig { teeth: vec![36, 37], ..undamped("soft") };
-    let mut food = Food::new((&config).into(), &[36, 37]);
+    let mut food = Food::new(&config, &[36, 37]);
     food.columns.iter_mut().for_each(|column| column.thickness_m = food.collected_m);
     let mut forces_n = [Vec3::zeros(); 2];
     food.bite(&[touch(0.008, 0.0), touch(0.006, 0.0)], &mut forces_n);
