@@ -23,7 +23,6 @@ use crate::master::sockets::SocketLink;
 use crate::master::wanted::WantedDrive;
 use crate::simulator::emulation::virtual_link::VirtualLink;
 use crate::simulator::injection::Injector;
-use crate::state::state;
 
 /// Tapped frames kept between two drains. A drain follows every cycle.
 const TAPPED: usize = 4096;
@@ -53,7 +52,7 @@ const TAPPED: usize = 4096;
 /// assert_eq!((reading.cycle, truth.cycle), (100, 100));
 /// # Ok::<_, masseter_plant::PlantError>(())
 /// ```
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct PlantCore<L = VirtualLink> {
     pub(crate) master: Master,
     /// The link to the drives.
@@ -67,16 +66,15 @@ pub struct PlantCore<L = VirtualLink> {
     command_sent_ns: u64,
 }
 
-state!(PlantCore {
-    values: master cycle tapped wire_events command_sent_ns;
-    parts: link injector;
-    constant: buses;
-});
-
 impl PlantCore {
     /// The scenario's plant with emulated drives on simulated wires, switched on at `now_ns`.
     pub fn new(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
         Self::with_link(VirtualLink::new(scenario, 0, now_ns)?, scenario, now_ns)
+    }
+
+    /// Whether both plants have the same tables of pushes.
+    pub fn has_pushes_of(&self, other: &Self) -> bool {
+        self.link.emulation.agenda.has_pushes_of(&other.link.emulation.agenda)
     }
 }
 

@@ -9,7 +9,6 @@
 //! | [`commissioning`] | a client of single drives that inspects, configures and moves them | `master`, [`emulation`] |
 //! | [`description`] | EDS and DBC of the emulated drives, DCF of any drive | [`emulation`], [`commissioning`] |
 //! | [`core`] | master and link as one pure step function | `master`, `simulator` |
-//! | [`state`] | what cycles change in a plant, written to an archive and read from one | |
 //! | [`process`] | the core bound to iceoryx2 and to real time | [`core`] |
 //!
 //! Between master and drives there are frames on a bus and nothing else. The plant does not depend on the controller
@@ -23,7 +22,6 @@ mod error;
 mod master;
 pub mod process;
 mod simulator;
-pub mod state;
 
 pub use error::{ContactError, DynamicsError, PlantError};
 pub use master::wanted;

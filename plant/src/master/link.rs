@@ -78,7 +78,7 @@ pub trait Link: Buses {
 pub(crate) const MASTER_PORT: usize = 0;
 
 /// The port of an axis' drive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct DrivePort {
     pub(crate) bus: usize,
     pub(crate) port: usize,

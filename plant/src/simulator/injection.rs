@@ -14,10 +14,10 @@ use masseter_runtime::messages::{Command, Event, LAYOUT_VERSION};
 use masseter_scenario::{CommandFault, FaultConfig, FaultKindConfig, Scenario};
 
 use crate::master::link::{Mishap, Occurrence};
-use crate::{error::PlantError, master::events::Journal, state::state};
+use crate::{error::PlantError, master::events::Journal};
 
 /// Follows the occurrences from which times count, hands out every window once, and alters commands.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Injector {
     injection: Injection,
     /// Entries with a window not handed out yet, each with whether the controller or the supervisor carries it out. An
@@ -28,11 +28,6 @@ pub(crate) struct Injector {
     commands: CommandFaults,
     events: Journal,
 }
-
-state!(Injector {
-    values: injection untold has_news events;
-    parts: commands;
-});
 
 impl Injector {
     /// The faults and stimuli of a scenario that is switched on at `now_ns`.
@@ -144,29 +139,23 @@ fn entries(scenario: &Scenario) -> Vec<(Injected, bool)> {
 const FOREIGN_CYCLES: u64 = 1 << 40;
 
 /// The faults of the commands.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct CommandFaults {
     faults: Vec<AlteringFault>,
 }
 
-state!(CommandFaults {
-    parts: faults;
-});
-
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct AlteringFault {
     injected: Injected,
     kind: CommandFault,
-    config: FaultConfig,
+    axis: Option<usize>,
+    size: f64,
+    /// Most time of it, ns.
+    longest_ns: u64,
     window_ns: Range<u64>,
     /// Whether its beginning is reported, and its end is not.
     is_acting: bool,
 }
-
-state!(AlteringFault {
-    values: window_ns is_acting;
-    constant: injected kind config;
-});
 
 impl CommandFaults {
     /// Those of a scenario's list, none of which acts before its window is set.
@@ -176,7 +165,9 @@ impl CommandFaults {
             Some(AlteringFault {
                 injected: Injected::Fault(place),
                 kind,
-                config: config.clone(),
+                axis: config.axis(),
+                size: config.size_si(),
+                longest_ns: config.acting_ns(0..u64::MAX).end,
                 window_ns: u64::MAX..u64::MAX,
                 is_acting: false,
             })
@@ -187,7 +178,8 @@ impl CommandFaults {
     /// Sets when a fault acts.
     pub(super) fn set_window(&mut self, injected: Injected, window_ns: &Range<u64>) {
         for fault in self.faults.iter_mut().filter(|fault| fault.injected == injected) {
-            fault.window_ns = fault.config.acting_ns(window_ns.clone());
+            let Range { start, end } = *window_ns;
+            fault.window_ns = start..end.min(start.saturating_add(fault.longest_ns));
         }
     }
 
@@ -202,17 +194,16 @@ impl CommandFaults {
     ) -> Option<Command> {
         let mut command = received;
         for fault in &mut self.faults {
-            let axis = fault.config.axis();
-            let mut tell =
-                |has_ended| report(Occurrence { injected: fault.injected, time_ns: now_ns, axis, has_ended });
+            let (injected, axis) = (fault.injected, fault.axis);
+            let mut tell = |has_ended| report(Occurrence { injected, time_ns: now_ns, axis, has_ended });
             if fault.window_ns.contains(&sampled_ns) {
                 let Some(received) = received else { continue };
                 // A fault counts by its effect alone, also when another fault withholds the command.
-                let is_altered = altered(received, fault.kind, &fault.config) != Some(received);
+                let is_altered = fault.altered(received) != Some(received);
                 if is_altered && !std::mem::replace(&mut fault.is_acting, true) {
                     tell(false);
                 }
-                command = command.and_then(|given| altered(given, fault.kind, &fault.config));
+                command = command.and_then(|given| fault.altered(given));
             } else if std::mem::take(&mut fault.is_acting) {
                 tell(true);
             }
@@ -221,16 +212,18 @@ impl CommandFaults {
     }
 }
 
-/// The effect of a fault on a command.
-fn altered(mut command: Command, kind: CommandFault, fault: &FaultConfig) -> Option<Command> {
-    match kind {
-        CommandFault::ControllerStall => return None,
-        CommandFault::Nan => command.target_m.fill(f64::NAN),
-        CommandFault::Jump => command.target_m[fault.axis().unwrap_or_default()] += fault.size_si(),
-        CommandFault::Version => command.version += 1,
-        CommandFault::Foreign => command.cycle += FOREIGN_CYCLES,
+impl AlteringFault {
+    /// The effect of the fault on a command.
+    fn altered(&self, mut command: Command) -> Option<Command> {
+        match self.kind {
+            CommandFault::ControllerStall => return None,
+            CommandFault::Nan => command.target_m.fill(f64::NAN),
+            CommandFault::Jump => command.target_m[self.axis.unwrap_or_default()] += self.size,
+            CommandFault::Version => command.version += 1,
+            CommandFault::Foreign => command.cycle += FOREIGN_CYCLES,
+        }
+        Some(command)
     }
-    Some(command)
 }
 
 #[cfg(test)]

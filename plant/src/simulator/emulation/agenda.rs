@@ -17,10 +17,9 @@ use crate::error::PlantError;
 use crate::master::link::Occurrence;
 use crate::simulator::mechanism::axes::AxisFaults;
 use crate::simulator::mechanism::contact::food::Food;
-use crate::state::state;
 
 /// The action of an entry.
-#[derive(Debug, Clone, serde::Serialize)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) enum Effect {
     /// A fault of one axis, or of all.
     Fault { kind: FaultKindConfig, size: f64, axis: Option<usize> },
@@ -32,12 +31,12 @@ pub(crate) enum Effect {
     Payload { kg: f64 },
 }
 
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct Entry {
     injected: Injected,
     effect: Effect,
-    /// The fault, which may shorten its window: for some kinds, the size is the duration.
-    fault: Option<FaultConfig>,
+    /// Most time of it: of a table its length, of some kinds of faults their size, ns.
+    longest_ns: u64,
     window_ns: Range<u64>,
     /// Number of its beginning among all, while active.
     begun: Option<u64>,
@@ -46,14 +45,8 @@ struct Entry {
     has_struck: bool,
 }
 
-state!(Entry {
-    values: window_ns begun began_m has_struck;
-    bound: effect;
-    constant: injected fault;
-});
-
 /// The agenda.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Agenda {
     entries: Vec<Entry>,
     /// No entry begins or ends before this time, ns.
@@ -63,22 +56,20 @@ pub(crate) struct Agenda {
     pub(crate) occurrences: VecDeque<Occurrence>,
 }
 
-state!(Agenda {
-    values: next_change_ns begun occurrences;
-    parts: entries;
-});
-
 impl Agenda {
     /// The entries of a scenario for drives and mechanism, switched on at `now_ns`. An entry with an unknown window
     /// does not act before its window is set.
     pub(crate) fn new(scenario: &Scenario, now_ns: u64) -> Result<Self, PlantError> {
         let faults = scenario.faults.iter().enumerate().filter_map(|(place, config)| {
-            Some(Entry::new(Injected::Fault(place), effect_of_fault(config)?, Some(config)))
+            let longest_ns = config.acting_ns(0..u64::MAX).end;
+            Some(Entry::new(Injected::Fault(place), effect_of_fault(config)?, longest_ns))
         });
         let mut entries: Vec<_> = faults.collect();
         for (place, config) in scenario.stimulus.iter().enumerate() {
             let effect = effect_of_stimulus(config, scenario)?;
-            entries.extend(effect.map(|effect| Entry::new(Injected::Stimulus(place), effect, None)));
+            entries.extend(
+                effect.map(|(effect, longest_ns)| Entry::new(Injected::Stimulus(place), effect, longest_ns)),
+            );
         }
         let injection =
             Injection::new(scenario, now_ns).map_err(|error| PlantError::Scenario(error.to_string()))?;
@@ -98,14 +89,22 @@ impl Agenda {
         self.entries.is_empty()
     }
 
+    /// Whether both have the same tables of pushes.
+    pub(crate) fn has_pushes_of(&self, other: &Self) -> bool {
+        fn pushes(agenda: &Agenda) -> impl Iterator<Item = &Push> {
+            agenda.entries.iter().filter_map(|entry| match &entry.effect {
+                Effect::Push(push) => Some(&**push),
+                _ => None,
+            })
+        }
+        pushes(self).eq(pushes(other))
+    }
+
     /// Sets the window of an entry.
     pub(crate) fn set_window(&mut self, injected: Injected, window_ns: &Range<u64>) {
         for entry in self.entries.iter_mut().filter(|entry| entry.injected == injected) {
-            entry.window_ns = match (&entry.fault, &entry.effect) {
-                (Some(fault), _) => fault.acting_ns(window_ns.clone()),
-                (None, Effect::Push(push)) => push.acting_ns(window_ns),
-                (None, _) => window_ns.clone(),
-            };
+            let Range { start, end } = *window_ns;
+            entry.window_ns = start..end.min(start.saturating_add(entry.longest_ns));
             self.next_change_ns = 0;
         }
     }
@@ -269,10 +268,10 @@ impl Agenda {
 }
 
 impl Entry {
-    fn new(injected: Injected, effect: Effect, fault: Option<&FaultConfig>) -> Self {
+    fn new(injected: Injected, effect: Effect, longest_ns: u64) -> Self {
         let window_ns = u64::MAX..u64::MAX;
         let (begun, began_m, has_struck) = (None, [0.0; AXES], false);
-        Self { injected, effect, fault: fault.cloned(), window_ns, begun, began_m, has_struck }
+        Self { injected, effect, longest_ns, window_ns, begun, began_m, has_struck }
     }
 
     fn changes(&self, now_ns: u64, is_begin: bool) -> bool {
@@ -293,7 +292,7 @@ impl Entry {
     fn strikes_at_once(&self) -> bool {
         match self.effect {
             Effect::Fault { .. } => false,
-            Effect::Payload { kg } => kg > 0.0 || self.fault.is_none(),
+            Effect::Payload { kg } => kg > 0.0 || matches!(self.injected, Injected::Stimulus(_)),
             Effect::Push(_) | Effect::Food(_) => true,
         }
     }
@@ -317,11 +316,18 @@ fn effect_of_fault(config: &FaultConfig) -> Option<Effect> {
     }
 }
 
-fn effect_of_stimulus(config: &StimulusConfig, scenario: &Scenario) -> Result<Option<Effect>, PlantError> {
-    let push = Push::new(config)?.map(|push| Effect::Push(Box::new(push)));
-    let food = || config.food.as_ref().map(|food| Effect::Food(Box::new(jaw::food(food, scenario))));
+/// The effect of a stimulus on the mechanism and its most time, ns; none for a stimulus elsewhere.
+fn effect_of_stimulus(
+    config: &StimulusConfig,
+    scenario: &Scenario,
+) -> Result<Option<(Effect, u64)>, PlantError> {
+    if let Some(push) = Push::new(config)? {
+        let longest_ns = push.longest_ns();
+        return Ok(Some((Effect::Push(Box::new(push)), longest_ns)));
+    }
+    let food = config.food.as_ref().map(|food| Effect::Food(Box::new(jaw::food(food, scenario))));
     let payload = || config.payload.map(|payload| Effect::Payload { kg: payload.si() });
-    Ok(push.or_else(food).or_else(payload))
+    Ok(food.or_else(payload).map(|effect| (effect, u64::MAX)))
 }
 
 #[cfg(test)]

@@ -18,8 +18,8 @@ use masseter_scenario::{
     QuirkKindConfig as Kind, Scenario,
 };
 
+use crate::error::PlantError;
 use crate::master::link::{check_quantities, node_ids};
-use crate::{error::PlantError, state::state};
 
 /// The settings of a scenario's drives, in the order of the axes.
 ///
@@ -138,18 +138,13 @@ fn quirks(config: &QuirkConfig) -> Vec<Quirk> {
 const _: () = assert!(INCREMENTS_PER_TURN == masseter_drives::INCREMENTS_PER_TURN);
 
 /// The memory of all drives and its file.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct MemoryFile {
     path: PathBuf,
     pub(super) drives: [DriveMemory; AXES],
     /// Whether the file does not have the present values.
     is_stale: bool,
 }
-
-state!(MemoryFile {
-    values: drives is_stale;
-    constant: path;
-});
 
 impl MemoryFile {
     /// Reads a file. A missing file stands for drives that have stored nothing.

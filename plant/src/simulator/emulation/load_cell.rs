@@ -5,24 +5,17 @@ use rand::{RngExt, SeedableRng};
 use rand_distr::StandardNormal;
 use rand_pcg::Pcg64Mcg;
 
-use crate::state::state;
-
 /// Parts the cell's random numbers from those of the encoders, which have odd multiples of another number.
 const STREAM: u64 = 0x4C6F_6164_4365_6C6C;
 
 /// The load cell.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct LoadCell {
     config: LoadCellConfig,
     /// The force behind the low-pass, N.
     passed_n: f64,
     random: Pcg64Mcg,
 }
-
-state!(LoadCell {
-    values: passed_n random;
-    constant: config;
-});
 
 impl LoadCell {
     /// A cell without load.

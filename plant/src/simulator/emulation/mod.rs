@@ -28,9 +28,9 @@ use masseter_scenario::{self as scenario, AxisFault, FaultKindConfig, Scenario};
 use nalgebra::Translation3;
 
 use crate::error::{DynamicsError, PlantError};
+use crate::master::link::Mishap;
 use crate::simulator::mechanism::contact::food::{Food, FoodBreak};
 use crate::simulator::mechanism::dynamics::{Dynamics, MechanismState, closed_mouth, level};
-use crate::{master::link::Mishap, state::state};
 use agenda::{Agenda, Effect};
 use drives::{MemoryFile, drive_settings};
 use encoder::Encoder;
@@ -59,7 +59,7 @@ pub use virtual_link::{NodePort, OpenLink, VirtualLink};
 /// assert_eq!(Cob::try_from(boot_up.id())?, Cob::Heartbeat(NodeId::new(1)?));
 /// # Ok::<_, Box<dyn std::error::Error>>(())
 /// ```
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct Emulation {
     /// In the order of the axes.
     pub(crate) drives: Vec<DriveNode>,
@@ -75,7 +75,7 @@ pub struct Emulation {
     sample: Sample,
     /// Whether each drive has received the SYNC of the sample.
     synchronised: [bool; AXES],
-    agenda: Agenda,
+    pub(crate) agenda: Agenda,
     encoders: [Encoder; AXES],
     /// The scenario's own food.
     food: Option<Food>,
@@ -88,13 +88,6 @@ pub struct Emulation {
     /// None for drives that forget everything at the end.
     memory: Option<MemoryFile>,
 }
-
-state!(Emulation {
-    values: drives next_step_ns moved_to_ns force_n bite_force_n sample synchronised encoders served mishaps
-        contact;
-    parts: dynamics load_cell agenda memory;
-    constant: step_ns food;
-});
 
 /// State of the mechanism at a SYNC. The computation of the truth comes later, after the reading.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]

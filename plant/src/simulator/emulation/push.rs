@@ -2,7 +2,7 @@
 //!
 //! Comments in the file begin with `#`, and blank lines are ignored. Between two rows the values change evenly.
 
-use std::{ops::Range, path::Path};
+use std::path::Path;
 
 use masseter_runtime::clock::SECOND_NS;
 use masseter_scenario::rows::{fields, lines, numbers};
@@ -12,14 +12,14 @@ use nalgebra::Vector6;
 use crate::error::PlantError;
 
 /// A push.
-#[derive(Debug, Clone, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Push {
     course: Course,
     /// Where the force acts, m in the platform frame; the incisal point when absent.
     pub(crate) point_m: Option<[f64; 3]>,
 }
 
-#[derive(Debug, Clone, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 enum Course {
     Shaped { whole: Vector6<f64>, shape: Shape, for_s: f64, frequency_hz: f64 },
     Table(WrenchTable),
@@ -46,14 +46,11 @@ impl Push {
         Ok(Some(Self { course, point_m: *point_m }))
     }
 
-    /// The window in which it acts: that of a table ends with the table.
-    pub(crate) fn acting_ns(&self, window_ns: &Range<u64>) -> Range<u64> {
-        let Range { start, end } = *window_ns;
+    /// Its most time, ns: a table ends with its last row.
+    pub(crate) fn longest_ns(&self) -> u64 {
         match &self.course {
-            Course::Shaped { .. } => start..end,
-            Course::Table(table) => {
-                start..end.min(start.saturating_add((table.length_s() * SECOND_NS as f64) as u64))
-            }
+            Course::Shaped { .. } => u64::MAX,
+            Course::Table(table) => (table.length_s() * SECOND_NS as f64) as u64,
         }
     }
 
@@ -77,7 +74,7 @@ const OF_FORCES: usize = 4;
 const LARGEST: [f64; 7] = [86_400.0, 2000.0, 2000.0, 2000.0, 200.0, 200.0, 200.0];
 
 /// The rows of a table.
-#[derive(Debug, Clone, PartialEq, serde::Serialize)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 pub(super) struct WrenchTable {
     /// Strictly increasing from 0.
     time_s: Vec<f64>,

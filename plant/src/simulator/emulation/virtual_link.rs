@@ -15,25 +15,18 @@ use crate::master::link::{
     Buses, DrivePort, Link, MASTER_PORT, Mishap, Occurrence, drive_ports, fault_seed, faults_of_bus,
     node_ids, restart_after_ns,
 };
-use crate::state::state;
 
 /// Frames that a port can hold for sending, and for receiving between two looks; a millisecond holds 21.
 const TRANSMIT_CAPACITY: usize = 64;
 const RECEIVE_CAPACITY: usize = 256;
 
 /// Simulated wires and the emulated drives on them, co-simulated event by event in the order of time.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub struct VirtualLink {
     wires: Vec<VirtualWire>,
     ports: [DrivePort; AXES],
     pub(crate) emulation: Emulation,
 }
-
-state!(VirtualLink {
-    values: wires;
-    parts: emulation;
-    constant: ports;
-});
 
 impl Buses for VirtualLink {
     fn port(&mut self, bus: usize) -> impl Bus {

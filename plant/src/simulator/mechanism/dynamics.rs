@@ -27,7 +27,6 @@ use super::contact::Occlusion;
 use super::friction::Braking;
 use super::ledger::{Ledger, StepForces};
 use crate::error::DynamicsError;
-use crate::state::state;
 
 /// Pose, twist and joint coordinates of the mechanism.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
@@ -46,7 +45,7 @@ impl MechanismState {
 }
 
 /// The moving mechanism.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Dynamics {
     mechanism: Mechanism,
     config: DynamicsConfig,
@@ -62,12 +61,6 @@ pub(crate) struct Dynamics {
     /// Energy of height at the start, J.
     start_j: f64,
 }
-
-state!(Dynamics {
-    values: state acceleration occlusion axes load ledger;
-    parts: braking;
-    constant: mechanism config bodies start_j;
-});
 
 impl Dynamics {
     /// The mechanism at rest in a pose of the platform, which must be within the strokes.

@@ -15,13 +15,11 @@ use masseter_model::dynamics::{
 use masseter_model::geometry::AXES;
 use nalgebra::{Matrix6, Vector6};
 
-use crate::state::state;
-
 /// Time in which friction follows the loads, s. Without this time, a self-locking guide shakes.
 const LOAD_TIME_S: f64 = 1e-3;
 
 /// Friction with its state.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(super) struct Braking {
     law: Friction,
     config: FrictionConfig,
@@ -29,11 +27,6 @@ pub(super) struct Braking {
     loads: Loads,
     bristles: [Bristles; AXES],
 }
-
-state!(Braking {
-    values: loads bristles;
-    constant: law config masses_kg;
-});
 
 /// The bristles of an axis (LuGre; Canudas de Wit et al., IEEE Trans. Automatic Control 40, 1995), whose stiffness grows
 /// with the load as Coulomb friction does.

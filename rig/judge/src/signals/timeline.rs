@@ -14,7 +14,7 @@ use crate::events::EventRecord;
 use crate::reference::{Progress, Reference};
 
 /// The messages of a cycle; a missing message is `None`.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
 pub struct CycleMessages {
     /// Number of the cycle, from 1: that of both loops, which count deadlines from one epoch.
     pub cycle: u64,

@@ -7,7 +7,6 @@ use std::{cell::Cell, convert::Infallible};
 
 use masseter_judge::{Analysis, Figures, Watch, signals::CycleMessages};
 use masseter_plant::core::PlantCore;
-use masseter_plant::state::{Archive, State};
 use masseter_recording::{Backlog, Recorded};
 use masseter_runtime::messages::{self, Command, Event, Message, Parameters, Reading, Signals};
 use masseter_runtime::{control::ControllerPorts, messages::tap::TapError, realtime::Wake};
@@ -76,7 +75,7 @@ impl Sink for Watch {
 }
 
 /// What a rig published last: reading, truth and contact of the present cycle, and the events of the last step.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(crate) struct Latest {
     pub(crate) cycle: CycleMessages,
     pub(crate) events: Vec<Event>,
@@ -95,17 +94,6 @@ impl Sink for Latest {
 
     fn has_failed(&self) -> bool {
         false
-    }
-}
-
-impl State for Latest {
-    fn exchange<A: Archive>(&mut self, archive: &mut A) -> Result<(), A::Error> {
-        // It takes no other message of a cycle.
-        let CycleMessages { reading, truth, contact, .. } = &mut self.cycle;
-        archive.value(reading)?;
-        archive.value(truth)?;
-        archive.value(contact)?;
-        archive.value(&mut self.events)
     }
 }
 

@@ -1,8 +1,8 @@
 //! The state of a rig at an instant, in memory and in files.
 //!
 //! A file has the magic number, the version of its format, a checksum of the rest, and what it belongs to: the sources of
-//! the build, the scenario's name, seed and keys. Then follows the state, in the encoding of postcard. What a scenario
-//! decides is not in it, so a file is read into a rig of the scenario.
+//! the build, the scenario's name, seed and keys. Then follows the state, in the encoding of postcard. A file is read into
+//! a rig of its scenario alone.
 
 #[cfg(test)]
 mod tests;
@@ -11,9 +11,8 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::{fs::Permissions, os::unix::fs::PermissionsExt, sync::Arc};
 
-use masseter_plant::state::{Archive, State};
 use masseter_scenario::{Scenario, input::read_bytes};
-use serde::{Deserialize, Serialize, de::DeserializeOwned};
+use serde::{Deserialize, Serialize};
 
 use crate::{log::Latest, stepper::StepperState};
 
@@ -151,15 +150,6 @@ pub struct Snapshot {
     pub(crate) has_failed: bool,
 }
 
-impl State for Snapshot {
-    fn exchange<A: Archive>(&mut self, archive: &mut A) -> Result<(), A::Error> {
-        let Self { scenario: _, stepper, latest, has_failed } = self;
-        stepper.exchange(archive)?;
-        latest.exchange(archive)?;
-        archive.value(has_failed)
-    }
-}
-
 impl Snapshot {
     /// Writes the snapshot into a file, as a whole or not at all. [`Rig::read_snapshot`](crate::Rig::read_snapshot)
     /// reads it.
@@ -189,27 +179,32 @@ impl Snapshot {
     /// The bytes of a file.
     #[inline]
     pub(crate) fn encode(&self) -> Vec<u8> {
-        let mut writer = Writer(Vec::new());
-        let written = writer.value(&mut Belonging::to(&self.scenario));
-        // A state is exchanged in place; the clone remains as it is.
-        written.and_then(|()| self.clone().exchange(&mut writer)).expect("every value has an encoding");
-        framed(FORMAT, &writer.0)
+        let Self { scenario, stepper, latest, has_failed } = self;
+        let content = postcard::to_allocvec(&(Belonging::to(scenario), stepper, latest, has_failed));
+        framed(FORMAT, &content.expect("every value has an encoding"))
     }
 
     /// The snapshot of these bytes, in place of this one.
     #[inline]
-    pub(crate) fn decoded(mut self, bytes: &[u8]) -> Result<Self, SnapshotProblem> {
-        let mut reader = Reader(content(bytes)?);
-        let own = Belonging::to(&self.scenario);
-        let found: Belonging = reader.read()?;
+    pub(crate) fn decoded(self, bytes: &[u8]) -> Result<Self, SnapshotProblem> {
+        let (own, content) = (Belonging::to(&self.scenario), content(bytes)?);
+        let damaged = |_| SnapshotProblem::Damaged;
+        let (found, state) = postcard::take_from_bytes::<Belonging>(content).map_err(damaged)?;
         if found.sources != own.sources {
             return Err(SnapshotProblem::OtherBuild);
         }
         if found != own {
             return Err(OtherScenario::new(&self.scenario, &found.name, found.seed).into());
         }
-        self.exchange(&mut reader)?;
-        if reader.0.is_empty() { Ok(self) } else { Err(SnapshotProblem::Damaged) }
+        let ((stepper, latest, has_failed), rest) =
+            postcard::take_from_bytes::<(StepperState, Latest, bool)>(state).map_err(damaged)?;
+        if !rest.is_empty() {
+            return Err(SnapshotProblem::Damaged);
+        }
+        if !stepper.has_pushes_of(&self.stepper) {
+            return Err(SnapshotProblem::OtherTable);
+        }
+        Ok(Self { stepper, latest, has_failed, ..self })
     }
 }
 
@@ -250,49 +245,4 @@ impl Belonging {
             keys: crc32fast::hash(scenario.to_toml().as_bytes()),
         }
     }
-}
-
-/// The bytes so far.
-struct Writer(Vec<u8>);
-
-impl Archive for Writer {
-    type Error = postcard::Error;
-
-    fn value<T: Serialize + DeserializeOwned>(&mut self, value: &mut T) -> Result<(), postcard::Error> {
-        self.0 = postcard::to_extend(value, std::mem::take(&mut self.0))?;
-        Ok(())
-    }
-
-    fn constant<T: Serialize>(&mut self, constant: &T) -> Result<(), postcard::Error> {
-        self.value(&mut checksum(constant)?)
-    }
-}
-
-/// The bytes left.
-struct Reader<'a>(&'a [u8]);
-
-impl Reader<'_> {
-    fn read<T: DeserializeOwned>(&mut self) -> Result<T, SnapshotProblem> {
-        let (value, rest) = postcard::take_from_bytes(self.0).map_err(|_| SnapshotProblem::Damaged)?;
-        self.0 = rest;
-        Ok(value)
-    }
-}
-
-impl Archive for Reader<'_> {
-    type Error = SnapshotProblem;
-
-    fn value<T: Serialize + DeserializeOwned>(&mut self, value: &mut T) -> Result<(), SnapshotProblem> {
-        *value = self.read()?;
-        Ok(())
-    }
-
-    fn constant<T: Serialize>(&mut self, constant: &T) -> Result<(), SnapshotProblem> {
-        let own = checksum(constant).map_err(|_| SnapshotProblem::Damaged)?;
-        if self.read::<u32>()? == own { Ok(()) } else { Err(SnapshotProblem::OtherTable) }
-    }
-}
-
-fn checksum<T: Serialize>(constant: &T) -> Result<u32, postcard::Error> {
-    Ok(crc32fast::hash(&postcard::to_allocvec(constant)?))
 }

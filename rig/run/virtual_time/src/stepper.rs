@@ -1,7 +1,6 @@
 //! The plant of a scenario that steps from one half of a cycle to the next, in exact time; and its state between them.
 
 use masseter_plant::cycle::{PlantPorts, begin_cycle, end_cycle, run_after_controller};
-use masseter_plant::state::{Archive, State};
 use masseter_plant::{PlantError, core::PlantCore, emulation::VirtualLink};
 use masseter_runtime::control::{self, Controller, Duties, Observed};
 use masseter_runtime::messages::{Command, Contact, Reading, Truth};
@@ -22,7 +21,7 @@ pub(crate) struct Stepper<S> {
 }
 
 /// All of it that cycles change, but for the sink.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 pub(crate) struct StepperState {
     plant: PlantCore,
     published: Published,
@@ -31,14 +30,10 @@ pub(crate) struct StepperState {
     cycle: u64,
 }
 
-impl State for StepperState {
-    fn exchange<A: Archive>(&mut self, archive: &mut A) -> Result<(), A::Error> {
-        let Self { plant, published, now_ns, reading, cycle } = self;
-        plant.exchange(archive)?;
-        archive.value(published)?;
-        archive.value(now_ns)?;
-        archive.value(reading)?;
-        archive.value(cycle)
+impl StepperState {
+    /// Whether both are of the same tables of pushes.
+    pub(crate) fn has_pushes_of(&self, other: &Self) -> bool {
+        self.plant.has_pushes_of(&other.plant)
     }
 }
 

@@ -8,7 +8,7 @@ use crate::geometry::{InverseError, Jacobian, LEGS, Legs, Mechanism, Pose, Twist
 
 /// A part of a leg that turns with its hinge. Its centre of mass lies on the leg's axis, and the slide's direction û is a
 /// principal axis of its inertia.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Link {
     /// Mass, kg.
     pub mass_kg: f64,
@@ -19,7 +19,7 @@ pub struct Link {
 }
 
 /// The platform with the lower jaw.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Platform {
     /// Mass, kg.
     pub mass_kg: f64,
@@ -30,7 +30,7 @@ pub struct Platform {
 }
 
 /// The moving bodies of the mechanism, under gravity along −z of the base. All three legs are equal.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Bodies {
     /// Carriage, kg: the slide moves the carriage without a turn. Its centre of mass is the hinge.
     pub carriage_kg: f64,

@@ -60,7 +60,7 @@ impl Loads {
 /// let at_n = friction.drag_n_s_per_m(coulomb_n[0], 0.05) * 0.05;
 /// assert!((at_n - 11.0).abs() < 1e-3);
 /// ```
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub struct Friction {
     config: FrictionConfig,
     unloaded_n: [f64; AXES],

@@ -83,7 +83,7 @@ pub enum InverseError {
 }
 
 /// A slide with its directions resolved; base frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 struct Slide {
     centre: Vec3,
     /// ûᵢ: positive displacement.
@@ -93,7 +93,7 @@ struct Slide {
 }
 
 /// A mechanism with checked dimensions.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Mechanism {
     slides: [Slide; LEGS],
     corners: [Vec3; LEGS],
