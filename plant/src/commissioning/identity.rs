@@ -10,9 +10,9 @@ use serde::{Deserialize, Serialize};
 
 use super::line::{BootUps, Line};
 use super::line_error::{LineError, OtherMaster, Restarted};
-use super::object_words::{SdoReason, object_name, value_text};
+use super::object_words::{object_name, value_text};
 use super::settings::Survey;
-use crate::master::wanted::WantedDrive;
+use crate::master::{sdo::SdoReason, wanted::WantedDrive};
 
 /// The identity object.
 const INDEX: u16 = 0x1018;

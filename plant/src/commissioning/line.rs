@@ -16,9 +16,8 @@ use masseter_scenario::{MASTER_NODE, ObjectKey, Scenario};
 use serde::{Deserialize, Serialize};
 
 use super::line_error::{LineError, MasterSign, Restarted};
-use super::object_words::SdoReason;
 use super::traffic::{Heard, Strangers, Traffic};
-use crate::master::sdo::{SdoClient, SdoFailure, number};
+use crate::master::sdo::{SdoClient, SdoReason, number};
 use crate::master::wanted::{is_write_only, shown_bits};
 use crate::{error::PlantError, master::link::Address};
 
@@ -317,11 +316,7 @@ impl Line {
         if let Some(abort) = client.poll(self.now_ns()) {
             self.traffic.send(bus, abort.frame(node))?;
         }
-        let reason = match failure {
-            SdoFailure::Aborted { code, .. } => SdoReason::Aborted(code),
-            SdoFailure::Silent { .. } => SdoReason::Silent,
-        };
-        Err(LineError::Sdo { axis, object, reason })
+        Err(LineError::Sdo { axis, object, reason: failure.reason })
     }
 }
 

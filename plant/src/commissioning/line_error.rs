@@ -7,8 +7,8 @@ use masseter_can::canopen::{AbortCode, ObjectAddress};
 use masseter_can::{SendError, explain_errno};
 use masseter_model::geometry::AXIS_NAMES;
 
-use super::object_words::{SdoReason, object_name, value_text};
-use crate::error::PlantError;
+use super::object_words::{object_name, value_text};
+use crate::{error::PlantError, master::sdo::SdoReason};
 
 /// The reason for the end of a line.
 #[derive(Debug, thiserror::Error)]

@@ -26,6 +26,7 @@ mod watchdog;
 mod write;
 
 pub use crate::master::link::Address;
+pub use crate::master::sdo::SdoReason;
 pub use crate::master::sockets::judge_interfaces;
 pub use deviation::{Deviation, Outcome};
 pub use deviations::deviations;
@@ -39,7 +40,7 @@ pub use line_error::{LineError, MasterSign, OtherMaster, Restarted};
 pub use loan::give_back;
 pub use motion_error::{AxisError, MotionError, Silence, StopCause, Unproved};
 pub use mover::{Caution, Operator, Wish};
-pub use object_words::{SdoReason, object_name, reason_text, value_text};
+pub use object_words::{object_name, reason_text, value_text};
 pub use settings::{Difference, Settings, Survey};
 pub use steps::{PowerError, Stand, StoreError, SyncAnswers, prove_no_power, reset, stand, store, take_over};
 pub use traffic::{Heard, Strangers};

@@ -3,16 +3,7 @@
 use masseter_can::canopen::{AbortCode, ObjectAddress};
 use masseter_drives::entry;
 
-/// The reason for a missing answer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum SdoReason {
-    /// The drive refuses the transfer.
-    #[error("{0}")]
-    Aborted(AbortCode),
-    /// No answer comes.
-    #[error("no answer; check its power, wiring, bit rate and node id")]
-    Silent,
-}
+use crate::master::sdo::SdoReason;
 
 /// Why the read of an object fails.
 pub fn reason_text(reason: SdoReason) -> String {

@@ -8,8 +8,8 @@ use masseter_can::canopen::{Expedited, ObjectAddress};
 use masseter_scenario::{ObjectKey, ObjectRule};
 use serde::{Deserialize, Serialize};
 
-use super::{line::Line, line_error::LineError, object_words::SdoReason};
-use crate::master::sdo::number;
+use super::{line::Line, line_error::LineError};
+use crate::master::sdo::{SdoReason, number};
 use crate::master::wanted::{PdoLayout, PdoSetting, Setting, WantedDrive, may_keep};
 
 /// PDOs and objects of a drive.

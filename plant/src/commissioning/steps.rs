@@ -1,21 +1,21 @@
 //! Steps without a motion: proof that a drive has no power, positions of all axes, storing, answers to SYNC.
 
 use masseter_can::canopen::{NmtCommand, ObjectAddress};
-use masseter_can::cia402::{Controlword, DriveState, Statusword};
+use masseter_can::cia402::{Controlword, DriveState};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_scenario::{Scenario, StoreConfig};
 use serde::Serialize;
 
-use super::watch::{read_position, read_state};
-use super::{line::Line, line_error::LineError, motion_error::MotionError, object_words::SdoReason};
+use super::watch::{read_position, read_state, read_status};
+use super::{line::Line, line_error::LineError, motion_error::MotionError};
+use crate::master::sdo::SdoReason;
 
 /// Time of the watch over an axis, ns.
 const WATCH_NS: u64 = 200 * MILLISECOND_NS;
 /// Longest time of a drive from the command to the loss of its power, ns.
 const POWER_OFF_NS: u64 = 5 * SECOND_NS;
 const POSITION: ObjectAddress = ObjectAddress::new(0x6064, 0);
-const STATUS: ObjectAddress = ObjectAddress::new(0x6041, 0);
 
 /// The reason why nothing may be written to a drive.
 #[derive(Debug, thiserror::Error)]
@@ -54,9 +54,9 @@ pub enum PowerError {
 /// # Errors
 /// [`PowerError`].
 pub fn prove_no_power(line: &mut Line, axis: usize, noise: u32) -> Result<(), PowerError> {
-    let word = line.read_number(axis, STATUS)? as u16;
-    if !Statusword(word).state().is_ok_and(|state| !state.is_powered()) {
-        return Err(PowerError::Powered { axis, word });
+    let status = read_status(line, axis)?;
+    if !status.state().is_ok_and(|state| !state.is_powered()) {
+        return Err(PowerError::Powered { axis, word: status.0 });
     }
     let moved = motion(line, axis, WATCH_NS)?;
     if moved > noise { Err(PowerError::Moves { axis, increments: moved, noise }) } else { Ok(()) }

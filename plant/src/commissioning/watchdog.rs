@@ -19,8 +19,9 @@ use super::mover::{Caution, Mover, Operator, POSITIONING, Wish};
 use super::watch::{
     TRANSITION_NS, disable_voltage, read_error_code, read_state, stop_drive, wait_for_state, watch_unpowered,
 };
-use super::{line::Line, line_error::LineError, loan::Loan, object_words::SdoReason, steps::START_NS};
-use crate::master::wanted::{WantedDrive, rpdo_timeout_ms};
+use super::{line::Line, line_error::LineError, loan::Loan, steps::START_NS};
+use crate::master::sdo::SdoReason;
+use crate::master::wanted::{PdoSetting, WantedDrive, WantedIdentity, rpdo_timeout_ms};
 
 /// How much longer than its time a drive may take: some drives look every few milliseconds, and the statusword comes by SDO.
 const MARGIN_NS: u64 = 50 * MILLISECOND_NS;
@@ -149,7 +150,7 @@ impl<'a> Proof<'a> {
         let loans: Vec<_> = of_run.collect();
         mover.borrow(&loans)?;
         if silence == Silence::ProcessData {
-            check_pdo(mover, node)?;
+            check_pdo(mover, &wanted.pdos[0])?;
         }
         Ok(Self { scenario, silence, timeout_ms, node, in_fault })
     }
@@ -322,17 +323,12 @@ fn with_faults(cause: MotionError, recovered: Result<(), MotionError>) -> Motion
     }
 }
 
-/// RPDO1 must exist and hold what the rig sends, which `configure` writes.
-fn check_pdo(mover: &mut Mover<'_>, node: NodeId) -> Result<(), MotionError> {
-    const COB_ID_BITS: u32 = 0x8000_07FF;
-    let mapping = mover.profile().pdos.rpdo1();
-    let entries = (1..).zip(mapping.entries()).map(|(subindex, entry)| (0x1600, subindex, *entry, u32::MAX));
-    let cob_id = 0x200 + u32::from(node.get());
-    let wanted = [(0x1400, 1, cob_id, COB_ID_BITS), (0x1600, 0, mapping.entries().len() as u32, u32::MAX)];
-    for (index, subindex, value, bits) in wanted.into_iter().chain(entries) {
-        let found = mover.line.read_if_there(mover.axis, ObjectAddress::new(index, subindex))?;
-        if found.is_none_or(|found| (found ^ value) & bits != 0) {
-            return Err(AxisError::OtherMapping { index }.of(mover.axis));
+/// RPDO1 must exist and hold what the rig sends, which `configure` writes. Its transmission type does not matter here.
+fn check_pdo(mover: &mut Mover<'_>, rpdo1: &PdoSetting) -> Result<(), MotionError> {
+    for WantedIdentity { object, mask, value } in rpdo1.compared().filter(|one| one.object != rpdo1.part(2)) {
+        let found = mover.line.read_if_there(mover.axis, object)?;
+        if found.is_none_or(|found| (found ^ value) & mask != 0) {
+            return Err(AxisError::OtherMapping { index: object.index }.of(mover.axis));
         }
     }
     Ok(())

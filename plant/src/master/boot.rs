@@ -11,7 +11,7 @@ use masseter_scenario::AccelerationUnit;
 
 use super::boot_plan::{Check, Demand, Step, Write, plan};
 use super::events::Failure;
-use super::sdo::{ATTEMPTS, SdoClient, SdoFailure, number};
+use super::sdo::{ATTEMPTS, SdoClient, SdoFailure, SdoReason, number};
 use super::wanted::{WantedDrive, is_write_only};
 
 /// Silence of a server before a transfer begins anew, ns. Drives that store parameters or boot take seconds, and no
@@ -40,10 +40,10 @@ fn at(cause: Cause, object: ObjectAddress, value: u32, limit: u32) -> Failure {
 }
 
 impl From<SdoFailure> for Failure {
-    fn from(failure: SdoFailure) -> Self {
-        match failure {
-            SdoFailure::Aborted { object, code } => at(Cause::SdoAborted, object, code.0, 0),
-            SdoFailure::Silent { object } => {
+    fn from(SdoFailure { object, reason }: SdoFailure) -> Self {
+        match reason {
+            SdoReason::Aborted(code) => at(Cause::SdoAborted, object, code.0, 0),
+            SdoReason::Silent => {
                 let timeout_ms = (TIMEOUT_NS / MILLISECOND_NS) as u32;
                 at(Cause::SdoTimeout, object, timeout_ms * ATTEMPTS, timeout_ms)
             }
@@ -201,7 +201,7 @@ impl Boot {
     /// The number of steps to skip after the refusal of the present step, for an optional value or an optional object.
     /// None for a refusal that is a failure.
     fn skipped_if_refused(&self, failure: SdoFailure) -> Option<usize> {
-        let SdoFailure::Aborted { code, .. } = failure else { return None };
+        let SdoReason::Aborted(code) = failure.reason else { return None };
         let is_missing = matches!(code, AbortCode::NO_OBJECT | AbortCode::NO_SUBINDEX);
         match self.steps[self.next] {
             Step::Write(Write { demand: Demand::KeptIfTaken | Demand::Nothing, .. }) => Some(0),
@@ -218,7 +218,7 @@ impl Boot {
 
     /// Whether a drive that refuses this step may have the value already.
     fn may_be_constant(&self, failure: SdoFailure) -> bool {
-        let SdoFailure::Aborted { code, .. } = failure else { return false };
+        let SdoReason::Aborted(code) = failure.reason else { return false };
         match self.steps[self.next] {
             Step::Write(Write { demand: Demand::KeptIfPresent, .. }) => true,
             Step::Write(_) => code == AbortCode::READ_ONLY,
@@ -254,7 +254,9 @@ impl Boot {
                 self.read_again(at(Cause::NotKept, object, found, value & bits))?;
                 self.written = Some(Ok(()));
             }
-            (Ok(()), Err(SdoFailure::Aborted { code, .. })) if is_write_only(code) => self.end_step(0),
+            (Ok(()), Err(SdoFailure { reason: SdoReason::Aborted(code), .. })) if is_write_only(code) => {
+                self.end_step(0);
+            }
             (Ok(()), Err(failure)) => return Err(failure.into()),
         }
         Ok(())

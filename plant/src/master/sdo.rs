@@ -14,13 +14,22 @@ pub(crate) const ATTEMPTS: u32 = 3;
 /// Bytes of the longest value that is read.
 const LONGEST_VALUE: usize = 1792;
 
-/// Why a transfer fails.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub(crate) enum SdoFailure {
-    /// An abort by one side.
-    Aborted { object: ObjectAddress, code: AbortCode },
+/// The reason for a missing answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error, serde::Serialize, serde::Deserialize)]
+pub enum SdoReason {
+    /// One side aborts the transfer, mostly the drive.
+    #[error("{0}")]
+    Aborted(AbortCode),
     /// No answer comes.
-    Silent { object: ObjectAddress },
+    #[error("no answer; check its power, wiring, bit rate and node id")]
+    Silent,
+}
+
+/// A transfer that fails.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+pub(crate) struct SdoFailure {
+    pub(crate) object: ObjectAddress,
+    pub(crate) reason: SdoReason,
 }
 
 /// The next action of a transfer.
@@ -78,7 +87,7 @@ impl SdoClient {
         }
         let object = transfer.object;
         (self.transfer, self.abort) = (None, Some((object, AbortCode::TIMED_OUT)));
-        Err(SdoFailure::Silent { object })
+        Err(SdoFailure { object, reason: SdoReason::Silent })
     }
 
     /// The request that is due, if any.
@@ -112,7 +121,7 @@ impl SdoClient {
             |toggle| Transfer { object, action: Action::ReadSegment { toggle }, sent_ns: None, attempt };
         let outcome = match (response, action) {
             (SdoResponse::Abort { object: answered, code }, _) if answered == object => {
-                Err(SdoFailure::Aborted { object, code })
+                Err(SdoFailure { object, reason: SdoReason::Aborted(code) })
             }
             (SdoResponse::Download { object: answered }, Action::Write(data)) if answered == object => {
                 Ok(Some(data))
@@ -149,7 +158,7 @@ impl SdoClient {
     /// Aborts the read of a value that is too long.
     fn abort(&mut self, object: ObjectAddress) -> SdoFailure {
         self.abort = Some((object, AbortCode::LENGTH));
-        SdoFailure::Aborted { object, code: AbortCode::LENGTH }
+        SdoFailure { object, reason: SdoReason::Aborted(AbortCode::LENGTH) }
     }
 }
 

@@ -43,14 +43,14 @@ fn a_refusal_names_object_and_reason() {
     let mut client = writing(HEARTBEAT, &[50, 0]);
     let refusal = [0x80, 0x17, 0x10, 0, 0x02, 0, 0x01, 0x06];
     let error = play(&mut client, [0x2B, 0x17, 0x10, 0, 50, 0, 0, 0], refusal).unwrap_err();
-    assert_eq!(error, SdoFailure::Aborted { object: HEARTBEAT, code: AbortCode::READ_ONLY });
+    assert_eq!(error, SdoFailure { object: HEARTBEAT, reason: SdoReason::Aborted(AbortCode::READ_ONLY) });
 }
 
 #[test]
 fn a_value_longer_than_four_bytes_ends_the_transfer_on_both_sides() {
     let mut client = reading(NAME);
     let outcome = play(&mut client, [0x40, 0x08, 0x10, 0, 0, 0, 0, 0], [0x41, 0x08, 0x10, 0, 9, 0, 0, 0]);
-    assert_eq!(outcome, Err(SdoFailure::Aborted { object: NAME, code: AbortCode::LENGTH }));
+    assert_eq!(outcome, Err(SdoFailure { object: NAME, reason: SdoReason::Aborted(AbortCode::LENGTH) }));
     assert_eq!(client.poll(0), Some(SdoRequest::Abort { object: NAME, code: AbortCode::LENGTH }));
     assert!(client.is_idle());
 }
@@ -64,7 +64,7 @@ fn silence_is_answered_by_asking_again_and_then_given_up() {
         client.expire(now_ns + TIMEOUT_NS, TIMEOUT_NS).unwrap();
         assert_eq!(client.poll(now_ns + TIMEOUT_NS), None, "not yet");
         now_ns += TIMEOUT_NS + 1;
-        let silent = Err(SdoFailure::Silent { object: HEARTBEAT });
+        let silent = Err(SdoFailure { object: HEARTBEAT, reason: SdoReason::Silent });
         assert_eq!(client.expire(now_ns, TIMEOUT_NS), if attempt < ATTEMPTS { Ok(()) } else { silent });
     }
     let abort = SdoRequest::Abort { object: HEARTBEAT, code: AbortCode::TIMED_OUT };
@@ -121,7 +121,7 @@ fn a_segment_is_not_asked_for_twice() {
     client.poll(0);
     client.take_answer(SdoResponse::InitiateUpload { object: NAME, size: None }, Some(&mut value));
     client.poll(0);
-    assert_eq!(client.expire(TIMEOUT_NS + 1, TIMEOUT_NS), Err(SdoFailure::Silent { object: NAME }));
+    assert_eq!(client.expire(TIMEOUT_NS + 1, TIMEOUT_NS), Err(SdoFailure { object: NAME, reason: SdoReason::Silent }));
     let abort = SdoRequest::Abort { object: NAME, code: AbortCode::TIMED_OUT };
     assert_eq!(client.poll(0), Some(abort));
 }
