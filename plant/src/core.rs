@@ -249,8 +249,8 @@ impl<L: Link> PlantCore<L> {
                 self.wire_events.add(event_of_note(&note, bus, axis, self.cycle));
             }
         }
-        while let Some((time_ns, mishap)) = self.link.next_mishap() {
-            self.injector.note_mishap(time_ns, &mishap, self.cycle);
+        while let Some(mishap) = self.link.next_mishap() {
+            self.injector.note_mishap(Event { cycle: self.cycle, ..mishap });
         }
         if !self.injector.is_empty() {
             self.follow_injections();

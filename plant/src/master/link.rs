@@ -45,8 +45,8 @@ pub trait Link: Buses {
         None
     }
 
-    /// The next mishap of the mechanism, with its time, ns.
-    fn next_mishap(&mut self) -> Option<(u64, Mishap)> {
+    /// The next mishap of the mechanism, an event without its cycle.
+    fn next_mishap(&mut self) -> Option<Event> {
         None
     }
 
@@ -277,43 +277,5 @@ impl Occurrence {
         let event = Event::new(Source::Scenario, EventKind::Notice, cause);
         let axis = axis.map_or(event.axis, |axis| axis as u32);
         Event { time_ns, cycle, axis, value: (place + 1) as f64, limit: 1.0, ..event }
-    }
-}
-
-/// A mishap of the mechanism.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
-pub enum Mishap {
-    /// A piece of food broke between the teeth.
-    FoodBroke {
-        /// FDI number of the first of the teeth on which the piece lay.
-        tooth: u8,
-        /// The piece's elastic force before, N.
-        force_n: f64,
-        /// Its strength, N.
-        strength_n: f64,
-    },
-    /// An axis ran into an end stop.
-    EndStopHit {
-        /// The axis.
-        axis: usize,
-        /// Its speed, m/s.
-        speed_m_s: f64,
-    },
-}
-
-impl Mishap {
-    /// The event that reports it, at that time.
-    pub(crate) fn event(&self, time_ns: u64, cycle: u64) -> Event {
-        let notice =
-            |cause| Event { time_ns, cycle, ..Event::new(Source::Scenario, EventKind::Notice, cause) };
-        match *self {
-            Self::FoodBroke { tooth, force_n, strength_n } => {
-                let event = notice(Cause::FoodBroke);
-                Event { object: tooth.into(), value: force_n, limit: strength_n, ..event }
-            }
-            Self::EndStopHit { axis, speed_m_s } => {
-                Event { axis: axis as u32, value: speed_m_s, ..notice(Cause::EndStopHit) }
-            }
-        }
     }
 }

@@ -13,8 +13,7 @@ use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::messages::{Command, Event, LAYOUT_VERSION};
 use masseter_scenario::{CommandFault, FaultConfig, FaultKindConfig, Scenario};
 
-use crate::master::link::{Mishap, Occurrence};
-use crate::{error::PlantError, master::events::Journal};
+use crate::{error::PlantError, master::events::Journal, master::link::Occurrence};
 
 /// Follows the occurrences from which times count, hands out every window once, and alters commands.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
@@ -79,8 +78,8 @@ impl Injector {
     }
 
     /// Takes a mishap of the mechanism.
-    pub(crate) fn note_mishap(&mut self, time_ns: u64, mishap: &Mishap, cycle: u64) {
-        self.events.add(mishap.event(time_ns, cycle));
+    pub(crate) fn note_mishap(&mut self, mishap: Event) {
+        self.events.add(mishap);
     }
 
     /// The next window that has become known.

@@ -121,7 +121,10 @@ fn a_segment_is_not_asked_for_twice() {
     client.poll(0);
     client.take_answer(SdoResponse::InitiateUpload { object: NAME, size: None }, Some(&mut value));
     client.poll(0);
-    assert_eq!(client.expire(TIMEOUT_NS + 1, TIMEOUT_NS), Err(SdoFailure { object: NAME, reason: SdoReason::Silent }));
+    assert_eq!(
+        client.expire(TIMEOUT_NS + 1, TIMEOUT_NS),
+        Err(SdoFailure { object: NAME, reason: SdoReason::Silent })
+    );
     let abort = SdoRequest::Abort { object: NAME, code: AbortCode::TIMED_OUT };
     assert_eq!(client.poll(0), Some(abort));
 }

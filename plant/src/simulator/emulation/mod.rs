@@ -23,12 +23,12 @@ use masseter_can::{CanId, ErrorState, Frame, canopen::Cob};
 use masseter_drives::{DriveFault, DriveNode, DriveSettings, HeldMean};
 use masseter_model::dynamics::Energy;
 use masseter_model::geometry::{AXES, Mechanism};
-use masseter_runtime::messages::{Contact, Truth, WORKS, pose_fields};
+use masseter_runtime::messages::codes::{Cause, EventKind, Source};
+use masseter_runtime::messages::{Contact, Event, Truth, WORKS, pose_fields};
 use masseter_scenario::{self as scenario, AxisFault, FaultKindConfig, Scenario};
 use nalgebra::Translation3;
 
 use crate::error::{DynamicsError, PlantError};
-use crate::master::link::Mishap;
 use crate::simulator::mechanism::contact::food::{Food, FoodBreak};
 use crate::simulator::mechanism::dynamics::{Dynamics, MechanismState, closed_mouth, level};
 use agenda::{Agenda, Effect};
@@ -81,8 +81,8 @@ pub struct Emulation {
     food: Option<Food>,
     /// The beginning of the stimulus whose food is served in place of the scenario's own.
     served: Option<u64>,
-    /// One of each axis, and one of the food, with its time, ns.
-    mishaps: [Option<(u64, Mishap)>; AXES + 1],
+    /// The last mishap of each axis, and that of the food.
+    mishaps: [Option<Event>; AXES + 1],
     /// The forces between the jaws in the cycle before the sample; `None` if the jaws cannot touch.
     contact: Option<Contact>,
     /// None for drives that forget everything at the end.
@@ -202,17 +202,18 @@ impl Emulation {
         }
     }
 
-    /// The next mishap of the mechanism, with its time, ns.
-    pub(crate) fn next_mishap(&mut self) -> Option<(u64, Mishap)> {
-        self.mishaps.iter_mut().find_map(Option::take)
-    }
-
     fn note_mishaps(&mut self, now_ns: u64) {
+        let notice = |cause| {
+            let event = Event::new(Source::Scenario, EventKind::Notice, cause);
+            Event { time_ns: now_ns, ..event }
+        };
         while let Some((axis, speed_m_s)) = self.dynamics.axes.take_stop_hit() {
-            self.mishaps[axis] = Some((now_ns, Mishap::EndStopHit { axis, speed_m_s }));
+            let hit = Event { axis: axis as u32, value: speed_m_s, ..notice(Cause::EndStopHit) };
+            self.mishaps[axis] = Some(hit);
         }
         if let Some(FoodBreak { tooth, force_n, strength_n }) = self.dynamics.occlusion.broke.take() {
-            self.mishaps[AXES] = Some((now_ns, Mishap::FoodBroke { tooth, force_n, strength_n }));
+            let (object, value, limit) = (tooth.into(), force_n, strength_n);
+            self.mishaps[AXES] = Some(Event { object, value, limit, ..notice(Cause::FoodBroke) });
         }
     }
 

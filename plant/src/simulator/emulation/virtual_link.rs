@@ -5,15 +5,15 @@ use std::ops::Range;
 use masseter_can::faults::{FaultNote, Faults};
 use masseter_can::{Bus, ReceiveError, Tapped, VirtualWire, WireConfig};
 use masseter_model::geometry::AXES;
-use masseter_runtime::messages::{Contact, Truth};
+use masseter_runtime::messages::{Contact, Event, Truth};
 use masseter_runtime::{injection::Injected, realtime::Waiter};
 use masseter_scenario::{MASTER_NODE, Scenario};
 
 use super::Emulation;
 use crate::error::{DynamicsError, PlantError};
 use crate::master::link::{
-    Buses, DrivePort, Link, MASTER_PORT, Mishap, Occurrence, drive_ports, fault_seed, faults_of_bus,
-    node_ids, restart_after_ns,
+    Buses, DrivePort, Link, MASTER_PORT, Occurrence, drive_ports, fault_seed, faults_of_bus, node_ids,
+    restart_after_ns,
 };
 
 /// Frames that a port can hold for sending, and for receiving between two looks; a millisecond holds 21.
@@ -73,8 +73,8 @@ impl Link for VirtualLink {
         self.emulation.agenda.occurrences.pop_front()
     }
 
-    fn next_mishap(&mut self) -> Option<(u64, Mishap)> {
-        self.emulation.next_mishap()
+    fn next_mishap(&mut self) -> Option<Event> {
+        self.emulation.mishaps.iter_mut().find_map(Option::take)
     }
 
     fn axis_at(&self, bus: usize, port: usize) -> Option<usize> {
