@@ -213,14 +213,8 @@ pub(crate) struct Overlay {
 }
 
 impl Overlay {
-    /// The drive lacks an object.
-    pub(crate) fn hide(&mut self, index: u16) {
-        let places = (0..ENTRIES.len()).filter(|place| ENTRIES[*place].address.index == index);
-        self.changes.extend(places.map(|place| (place, Change::Hidden)));
-    }
-
     /// The drive lacks an entry.
-    pub(crate) fn hide_entry(&mut self, place: usize) {
+    pub(crate) fn hide(&mut self, place: usize) {
         self.changes.push((place, Change::Hidden));
     }
 
@@ -335,10 +329,10 @@ mod overlay_tests {
     #[test]
     fn a_drive_has_the_table_but_for_its_differences() {
         let mut overlay = Overlay::default();
-        overlay.hide(0x607D);
+        overlay.hide(names::HOME_OFFSET.place);
         overlay.limit(names::PERIOD_VALUE.place, 1, 100);
         overlay.lock(names::PERIOD_VALUE.place);
-        assert_eq!(overlay.find(ObjectAddress::new(0x607D, 1)).unwrap_err(), AbortCode::NO_OBJECT);
+        assert_eq!(overlay.find(ObjectAddress::new(0x607C, 0)).unwrap_err(), AbortCode::NO_OBJECT);
         assert_eq!(overlay.find(ObjectAddress::new(0x60C2, 9)).unwrap_err(), AbortCode::NO_SUBINDEX);
         let (place, entry) = overlay.find(ObjectAddress::new(0x60C2, 1)).unwrap();
         assert_eq!((place, entry.limits), (names::PERIOD_VALUE.place, Some((1, 100))));

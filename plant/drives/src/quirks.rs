@@ -228,9 +228,9 @@ impl Delivered {
                 let modes = objects.get(names::SUPPORTED_MODES);
                 objects.set(names::SUPPORTED_MODES, modes & !CYCLIC_POSITION);
                 objects.set(names::MODE, 1);
-                for index in [0x6007, 0x6066, 0x6085] {
-                    overlay.hide(index);
-                }
+                overlay.hide(names::ABORT_CONNECTION_OPTION.place);
+                overlay.hide(names::FOLLOWING_TIMEOUT_MS.place);
+                overlay.hide(names::QUICK_STOP_DECELERATION.place);
             }
             Quirk::PdosLockedInOperation => node.locks_pdos = true,
             Quirk::TwoBootUps => node.boot_ups = 2,
@@ -256,7 +256,7 @@ impl Delivered {
             Quirk::SecondEncoder { limit_m } => axis.encoders_apart_m = Some(limit_m),
             Quirk::IncrementalEncoder => axis.is_incremental = true,
             Quirk::Shows { object, value } => overlay.show(place_of(object)?, value),
-            Quirk::Lacks { object } => overlay.hide_entry(place_of(object)?),
+            Quirk::Lacks { object } => overlay.hide(place_of(object)?),
         }
         Ok(())
     }
