@@ -9,8 +9,8 @@ use masseter_scenario::{HomingConfig, ObjectKey, ObjectRule, Scenario};
 use serde::Serialize;
 
 use super::motion_error::{AxisError, MotionError, StopCause};
-use super::mover::{Caution, HOMING, Mover, Operator, POSITIONING, Wish};
-use super::watch::{read_position, seconds};
+use super::mover::{HOMING, Mover, Operator, POSITIONING, Wish};
+use super::watch::{Caution, read_position, seconds};
 use super::{line::Line, loan::Loan};
 
 /// Methods that make the present place home (6098h).

@@ -7,10 +7,11 @@ use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_scenario::Scenario;
 use serde::Serialize;
 
+use super::line::Line;
 use super::motion_error::{AxisError, MotionError};
-use super::mover::{Caution, Mover, Operator, POSITIONING};
+use super::mover::{Mover, Operator, POSITIONING};
 use super::steps::{SyncAnswers, sync_answers};
-use super::{line::Line, watch::Sample};
+use super::watch::{Caution, Sample};
 
 /// The longest way of a jog, m.
 const MOST_M: f64 = 0.02;

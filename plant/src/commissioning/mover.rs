@@ -9,7 +9,7 @@ use masseter_scenario::{AxisScale, DriveProfile, MASTER_NODE, ObjectKey, ObjectR
 use super::loan::{Borrowed, Loan};
 use super::motion_error::{AxisError, MotionError, StopCause};
 use super::watch::{
-    Bounds, Sample, Watch, read_position, seconds, stop_drive, switch_off_drive, switch_on_drive,
+    Caution, Sample, Watch, read_position, seconds, stop_drive, switch_off_drive, switch_on_drive,
     wait_for_mode,
 };
 use super::{line::Line, line_error::LineError};
@@ -21,8 +21,6 @@ pub(super) const HOMING: i8 = 6;
 /// Time at rest with power on, and the time limit for it, ns.
 const STILL_NS: u64 = SECOND_NS;
 const RESTLESS_NS: u64 = 5 * SECOND_NS;
-/// Allowed share of the motor's force limit (6072h): at the limit the motor no longer follows.
-const USABLE: f64 = 0.9;
 /// Largest apparent way against the target that is no motion: the larger of these multiples of the noise and of an
 /// increment.
 const NOISES: f64 = 3.0;
@@ -52,13 +50,9 @@ impl<'a> Mover<'a> {
     ) -> Result<Self, MotionError> {
         line.command(axis, NmtCommand::EnterPreOperational)?;
         let following_m = scenario.drives.of_axis(axis).following_error_m;
-        let bounds = Bounds {
-            force_n: USABLE * caution.force_n,
-            window_m: following_m.min(2.0 * caution.still_m + caution.speed_m_s * 0.05),
-            still_m: caution.still_m,
-        };
+        let window_m = following_m.min(2.0 * caution.still_m + caution.speed_m_s * 0.05);
         let scales = std::array::from_fn::<_, AXES, _>(|axis| scenario.scale(axis));
-        let watch = Watch::begin(line, axis, scales, bounds)?;
+        let watch = Watch::begin(line, axis, scales, caution, window_m)?;
         let mut mover = Self {
             line,
             scenario,
@@ -86,7 +80,7 @@ impl<'a> Mover<'a> {
         // A following error is a fault at once, and a fault closes the brake at once. With a wrong feedback, a ramp
         // only drives the axis further. Not every drive takes these values.
         let at_once = [0x6066, 0x605E].map(|index| Loan { may_lack: true, ..Loan::new(index, 0, 0, 2) });
-        let window = scale.window(self.watch.bounds.window_m);
+        let window = scale.window(self.watch.window_m);
         let reduced = [
             Loan::new(0x1016, 1, consumed, 4),
             Loan::new(0x6007, 0, 3, 2),
@@ -225,7 +219,7 @@ impl<'a> Mover<'a> {
             start_m: self.position_m()?,
             target_m: scale.metres(target),
             backwards_m: self.backwards_m(),
-            beyond_m: 2.0 * still_m + self.watch.bounds.window_m,
+            beyond_m: 2.0 * still_m + self.watch.window_m,
         };
         let limit_s = 1.5 * (way.length_m() / speed_m_s + speed_m_s / acceleration_m_s2) + 1.0;
         let word = Controlword::ENABLE_OPERATION;
@@ -375,36 +369,3 @@ pub enum Wish {
 
 /// Asked at every look, with the line's time, ns.
 pub type Operator<'a> = dyn FnMut(u64) -> Wish + 'a;
-
-/// The caution of a motion.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Caution {
-    /// Speed (6081h), m/s.
-    pub speed_m_s: f64,
-    /// Acceleration and deceleration (6083h, 6084h), m/s².
-    pub acceleration_m_s2: f64,
-    /// Force limit (6072h), N.
-    pub force_n: f64,
-    /// Motion of an axis that shall stand, m.
-    pub still_m: f64,
-}
-
-impl Caution {
-    /// Share of the velocity and of the acceleration limit that is used by default.
-    const SPEED: f64 = 0.05;
-    /// Share of the force limit.
-    const FORCE: f64 = 0.2;
-    /// Motion of an axis that shall stand, m.
-    const STILL_M: f64 = 1e-4;
-
-    /// The usual caution for an axis: 5 % of its velocity, 20 % of its force.
-    pub fn usual(scenario: &Scenario, axis: usize) -> Self {
-        let drive = scenario.drives.of_axis(axis);
-        Self {
-            speed_m_s: Self::SPEED * drive.max_velocity_m_s,
-            acceleration_m_s2: Self::SPEED * drive.quick_stop_deceleration_m_s2,
-            force_n: Self::FORCE * drive.max_force_n,
-            still_m: Self::STILL_M,
-        }
-    }
-}

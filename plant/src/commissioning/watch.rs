@@ -6,7 +6,7 @@ use masseter_can::canopen::{EmergencyCode, ObjectAddress};
 use masseter_can::cia402::{Controlword, DriveState, StatusBit, Statusword};
 use masseter_model::geometry::AXES;
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
-use masseter_scenario::{AxisScale, BrakeConfig};
+use masseter_scenario::{AxisScale, BrakeConfig, Scenario};
 
 use super::line::{BootUps, Line};
 use super::line_error::LineError;
@@ -16,16 +16,40 @@ use super::motion_error::{AxisError, MotionError, StopCause, Unproved};
 const INPUTS: ObjectAddress = ObjectAddress::new(0x60FD, 0);
 const NEGATIVE_SWITCH: u32 = 0b01;
 const POSITIVE_SWITCH: u32 = 0b10;
+/// Allowed share of the motor's force limit (6072h): at the limit the motor no longer follows.
+const USABLE: f64 = 0.9;
 
-/// The limits while one axis moves.
+/// The caution of a motion.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Bounds {
-    /// Force of the motor, N.
-    pub(super) force_n: f64,
-    /// The following error window, m.
-    pub(super) window_m: f64,
+pub struct Caution {
+    /// Speed (6081h), m/s.
+    pub speed_m_s: f64,
+    /// Acceleration and deceleration (6083h, 6084h), m/s².
+    pub acceleration_m_s2: f64,
+    /// Force limit (6072h), N.
+    pub force_n: f64,
     /// Motion of an axis that shall stand, m.
-    pub(super) still_m: f64,
+    pub still_m: f64,
+}
+
+impl Caution {
+    /// Share of the velocity and of the acceleration limit that is used by default.
+    const SPEED: f64 = 0.05;
+    /// Share of the force limit.
+    const FORCE: f64 = 0.2;
+    /// Motion of an axis that shall stand, m.
+    const STILL_M: f64 = 1e-4;
+
+    /// The usual caution for an axis: 5 % of its velocity, 20 % of its force.
+    pub fn usual(scenario: &Scenario, axis: usize) -> Self {
+        let drive = scenario.drives.of_axis(axis);
+        Self {
+            speed_m_s: Self::SPEED * drive.max_velocity_m_s,
+            acceleration_m_s2: Self::SPEED * drive.quick_stop_deceleration_m_s2,
+            force_n: Self::FORCE * drive.max_force_n,
+            still_m: Self::STILL_M,
+        }
+    }
 }
 
 /// The limit switches at the beginning of a motion.
@@ -55,8 +79,9 @@ pub struct Sample {
 pub(super) struct Watch {
     axis: usize,
     scales: [AxisScale; AXES],
-    /// What is allowed.
-    pub(super) bounds: Bounds,
+    caution: Caution,
+    /// The following error window, m.
+    pub(super) window_m: f64,
     /// Positions of all axes at the beginning, m.
     began_m: [f64; AXES],
     /// Emergencies received before.
@@ -100,7 +125,8 @@ impl Watch {
         line: &mut Line,
         axis: usize,
         scales: [AxisScale; AXES],
-        bounds: Bounds,
+        caution: Caution,
+        window_m: f64,
     ) -> Result<Self, MotionError> {
         let mut began_m = [0.0; AXES];
         for (axis, began_m) in began_m.iter_mut().enumerate() {
@@ -113,7 +139,7 @@ impl Watch {
         let switches = read_switches(line, axis, began_m[axis])?;
         let emergencies = std::array::from_fn(|axis| line.heard(axis).emergencies.len());
         let boot_ups = BootUps::until_now(line);
-        Ok(Self { axis, scales, bounds, began_m, emergencies, boot_ups, switches, next: 0 })
+        Ok(Self { axis, scales, caution, window_m, began_m, emergencies, boot_ups, switches, next: 0 })
     }
 
     /// Refuses to go on after a restart of a drive, which loses its reduced limits, and beside another master.
@@ -176,7 +202,7 @@ impl Watch {
     }
 
     fn stop_cause(&self, line: &mut Line, sample: &Sample) -> Result<Option<StopCause>, MotionError> {
-        let (axis, Bounds { force_n: limit_n, window_m, .. }) = (self.axis, self.bounds);
+        let (axis, window_m, limit_n) = (self.axis, self.window_m, USABLE * self.caution.force_n);
         let Sample { status, force_n, .. } = *sample;
         // In homing the same bit is a homing error, which the caller judges.
         let state = status.state().map_err(|error| AxisError::Statusword(error).of(axis))?;
@@ -219,7 +245,7 @@ impl Watch {
             return Ok(Some(StopCause::OtherPowered { other, state }));
         }
         let moved_m = read_position(line, other, &self.scales[other])? - self.began_m[other];
-        Ok((moved_m.abs() > self.bounds.still_m).then_some(StopCause::OtherAxis { other, moved_m }))
+        Ok((moved_m.abs() > self.caution.still_m).then_some(StopCause::OtherAxis { other, moved_m }))
     }
 }
 

@@ -15,9 +15,10 @@ use masseter_scenario::Scenario;
 use serde::{Deserialize, Serialize};
 
 use super::motion_error::{AxisError, MotionError, Silence, StopCause};
-use super::mover::{Caution, Mover, Operator, POSITIONING, Wish};
+use super::mover::{Mover, Operator, POSITIONING, Wish};
 use super::watch::{
-    TRANSITION_NS, disable_voltage, read_error_code, read_state, stop_drive, wait_for_state, watch_unpowered,
+    Caution, TRANSITION_NS, disable_voltage, read_error_code, read_state, stop_drive, wait_for_state,
+    watch_unpowered,
 };
 use super::{line::Line, line_error::LineError, loan::Loan, steps::START_NS};
 use crate::master::sdo::SdoReason;
