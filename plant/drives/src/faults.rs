@@ -64,9 +64,11 @@ impl DriveFaults {
         self.size(kind).is_some()
     }
 
-    /// Notes that the fault of that kind has struck.
-    pub(super) fn strike(&mut self, kind: DriveFault) {
-        self.struck[kind as usize] |= self.has(kind);
+    /// Notes that the fault of that kind strikes now, if it acts; returns whether it acts.
+    pub(super) fn strike(&mut self, kind: DriveFault) -> bool {
+        let acts = self.has(kind);
+        self.struck[kind as usize] |= acts;
+        acts
     }
 
     /// Whether the fault of that kind has struck since its last change.

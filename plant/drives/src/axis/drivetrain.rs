@@ -186,17 +186,12 @@ impl Motor {
     fn brake_n(&mut self, asked: Asked, shaft: Motion, faults: &mut DriveFaults) -> f64 {
         if asked.is_braking {
             self.stuck_at_m = None;
-            if !faults.has(DriveFault::BrakeOpen) {
-                return asked.force_n;
-            }
-            faults.strike(DriveFault::BrakeOpen);
-            return 0.0;
+            return if faults.strike(DriveFault::BrakeOpen) { 0.0 } else { asked.force_n };
         }
-        if !faults.has(DriveFault::BrakeClosed) {
+        if !faults.strike(DriveFault::BrakeClosed) {
             self.stuck_at_m = None;
             return 0.0;
         }
-        faults.strike(DriveFault::BrakeClosed);
         let at_m = *self.stuck_at_m.get_or_insert(shaft.position_m);
         BRAKE_STIFFNESS_N_M * (at_m - shaft.position_m) - BRAKE_DAMPING_N_S_M * shaft.velocity_m_s
     }
@@ -207,8 +202,7 @@ fn motor_n(asked: Asked, faults: &mut DriveFaults) -> f64 {
     if faults.has(DriveFault::Sto) || faults.has(DriveFault::Reboot) {
         return 0.0;
     }
-    if faults.has(DriveFault::Runaway) {
-        faults.strike(DriveFault::Runaway);
+    if faults.strike(DriveFault::Runaway) {
         return asked.max_force_n;
     }
     if asked.is_braking {

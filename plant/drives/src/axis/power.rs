@@ -51,20 +51,12 @@ impl PowerStage {
         } else {
             self.state.after(command)
         };
-        let next =
-            if self.is_kept_off(next, faults) { self.state } else { self.delayed(next, now_ns, faults) };
+        // The drive does not leave "switch on disabled" while the torque is safely off.
+        let leaves_off = self.state == DriveState::SwitchOnDisabled && next != self.state;
+        let is_kept_off = leaves_off && faults.strike(DriveFault::Sto);
+        let next = if is_kept_off { self.state } else { self.delayed(next, now_ns, faults) };
         let is_torque_off = next == DriveState::ReadyToSwitchOn && now_ns < self.torque_from_ns;
         (!is_torque_off).then_some(next)
-    }
-
-    /// Whether the drive would leave "switch on disabled" while the torque is safely off.
-    fn is_kept_off(self, next: DriveState, faults: &mut DriveFaults) -> bool {
-        let leaves_off = self.state == DriveState::SwitchOnDisabled && next != self.state;
-        let is_kept = leaves_off && faults.has(DriveFault::Sto);
-        if is_kept {
-            faults.strike(DriveFault::Sto);
-        }
-        is_kept
     }
 
     /// The next state, where an injected fault delays "operation enabled".

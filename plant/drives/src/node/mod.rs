@@ -283,8 +283,7 @@ impl DriveNode {
 
     /// Loses the supply, or boots when it is back. Without it the node is silent and the brake closed.
     fn follow_supply(&mut self, now_ns: u64) {
-        let is_off = self.axis.faults.has(DriveFault::Reboot);
-        self.axis.faults.strike(DriveFault::Reboot);
+        let is_off = self.axis.faults.strike(DriveFault::Reboot);
         match (std::mem::replace(&mut self.is_off, is_off), is_off) {
             (false, true) => {
                 self.axis.restart(now_ns, &self.objects);
