@@ -58,7 +58,8 @@ pub struct PlantCore<L = VirtualLink> {
     /// The link to the drives.
     pub(crate) link: L,
     buses: usize,
-    cycle: u64,
+    /// The number of the last cycle that began; 0 before the first.
+    pub(crate) cycle: u64,
     /// The tapped frames, with the index of the bus.
     tapped: Vec<(u16, Tapped)>,
     wire_events: Journal,
@@ -137,11 +138,6 @@ impl<L: Link> PlantCore<L> {
     pub fn withdraw(&mut self, scenario: &Scenario, withdrawn: Withdrawn, from_ns: u64) {
         self.injector.withdraw(scenario, withdrawn, from_ns);
         self.follow_injections();
-    }
-
-    /// The number of the last cycle that began; 0 before the first.
-    pub(crate) fn cycle(&self) -> u64 {
-        self.cycle
     }
 
     /// Simulates up to `now_ns` now, instead of at the beginning of the next cycle.

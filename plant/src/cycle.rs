@@ -153,8 +153,8 @@ pub fn run_after_controller<L: Link, P: PlantPorts<L>>(
     mut wait: impl FnMut(&mut PlantCore<L>, &mut P) -> Result<Wake, P::Error>,
 ) -> Result<(), P::Error> {
     plant.master.stop();
-    let last_cycle = plant.cycle() + cycles_after(period_ns);
-    while plant.cycle() < last_cycle {
+    let last_cycle = plant.cycle + cycles_after(period_ns);
+    while plant.cycle < last_cycle {
         let wake = wait(plant, ports)?;
         run_cycle(plant, ports, schedule, &wake)?;
     }

@@ -26,11 +26,10 @@ use masseter_model::geometry::{AXES, Mechanism};
 use masseter_runtime::messages::codes::{Cause, EventKind, Source};
 use masseter_runtime::messages::{Contact, Event, Truth, WORKS, pose_fields};
 use masseter_scenario::{self as scenario, AxisFault, FaultKindConfig, Scenario};
-use nalgebra::Translation3;
 
 use crate::error::{DynamicsError, PlantError};
 use crate::simulator::mechanism::contact::food::{Food, FoodBreak};
-use crate::simulator::mechanism::dynamics::{Dynamics, MechanismState, closed_mouth, level};
+use crate::simulator::mechanism::dynamics::{Dynamics, MechanismState, level};
 use agenda::{Agenda, Effect};
 use drives::{MemoryFile, drive_settings};
 use encoder::Encoder;
@@ -119,10 +118,9 @@ impl Emulation {
         }
         let mechanism = Mechanism::new(&scenario.mechanism)?;
         let food = scenario.food.as_ref().map(|config| jaw::food(config, scenario));
-        let closed = closed_mouth(&mechanism, scenario.jaw.closed_leg_m, scenario.jaw.closed_offset_m);
+        let closed = level(&mechanism, scenario.jaw.closed_leg_m, scenario.jaw.closed_offset_m);
         let occlusion = jaw::occlusion(scenario, &closed);
-        let start = Translation3::from(scenario.dynamics.initial_offset_m)
-            * level(&mechanism, scenario.dynamics.initial_leg_m);
+        let start = level(&mechanism, scenario.dynamics.initial_leg_m, scenario.dynamics.initial_offset_m);
         let agenda = Agenda::new(scenario, now_ns)?;
         let incisal_m = scenario.jaw.reference_point_m;
         let dynamics = Dynamics::new(mechanism, &scenario.dynamics, start, occlusion, incisal_m)?;

@@ -108,11 +108,6 @@ impl VirtualLink {
         Ok(Self { wires, ports, emulation })
     }
 
-    /// A port on a wire: the master's is followed by those of the drives, then by the free ones.
-    pub(crate) fn port_at(&mut self, bus: usize, port: usize) -> impl Bus {
-        self.wires[bus].port(port)
-    }
-
     /// Time of the next arrival or of the drives' next step, ns. Until then only a queued frame changes anything.
     pub(crate) fn next_event_ns(&mut self) -> u64 {
         let step_ns = self.emulation.next_step_ns;
@@ -203,7 +198,7 @@ fn wire(scenario: &Scenario, bus: usize, free_ports: usize, now_ns: u64) -> Resu
 #[derive(Debug)]
 pub struct OpenLink {
     link: VirtualLink,
-    /// Free ports of each bus.
+    /// Free ports of each bus, which follow those of the master and of the drives.
     free: Vec<Vec<usize>>,
 }
 
@@ -252,7 +247,7 @@ impl OpenLink {
     pub fn connect(&mut self, bus: usize) -> Option<NodePort> {
         let port = self.free.get_mut(bus)?.pop()?;
         // Frames that the port received while it was free are discarded.
-        while !matches!(self.link.port_at(bus, port).receive(u64::MAX), Ok(None)) {}
+        while !matches!(self.link.wires[bus].port(port).receive(u64::MAX), Ok(None)) {}
         Some(NodePort { bus, port })
     }
 
@@ -263,7 +258,7 @@ impl OpenLink {
 
     /// A foreign node's access to its bus.
     pub fn port(&mut self, node: &NodePort) -> impl Bus {
-        self.link.port_at(node.bus, node.port)
+        self.link.wires[node.bus].port(node.port)
     }
 }
 

@@ -8,7 +8,7 @@ use masseter_model::geometry::{AXES, LEGS, Mechanism};
 use nalgebra::Vector6;
 
 use super::coupling::Coupling;
-use super::friction::{Braking, Element, Spring};
+use super::friction::{Braking, CONTACT, Element, Spring};
 use super::stops::{Seizure, Stops};
 
 /// The axes d₁ d₂ d₃ l₁ l₂ l₃.
@@ -173,7 +173,7 @@ impl Axis {
         let AxisMotion { position_m, speed_m_s } = motion;
         let before = std::mem::replace(&mut self.faults, faults);
         self.touched = [false; 2];
-        self.seizure = faults.is_jammed.then(|| self.seizure.unwrap_or(Seizure::at(position_m)));
+        self.seizure = faults.is_jammed.then(|| self.seizure.unwrap_or(Seizure { held_at_m: position_m }));
         match faults.play_m {
             _ if faults.play_m == before.play_m => {}
             Some(play_m) => self.coupling.loosen(play_m, self.mass_kg, position_m, speed_m_s),
@@ -201,7 +201,9 @@ impl Axis {
         if let Some(seizure) = &mut self.seizure {
             element += seizure.hold(position_m, speed_m_s, step_s);
         }
-        if let Some(contact) = Stops::steel(self.faults.free_m).touch(position_m, speed_m_s, step_s) {
+        if let Some(contact) =
+            Stops::between(self.faults.free_m, CONTACT).touch(position_m, speed_m_s, step_s)
+        {
             self.touched[usize::from(contact.force_n < 0.0)] = true;
             element += contact;
         }

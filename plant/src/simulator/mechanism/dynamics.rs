@@ -291,14 +291,10 @@ impl Load {
     }
 }
 
-/// The platform with the mouth closed: on legs of that mean length, and shifted. The pose is level, an approximation
-/// for a mechanism of unequal sides, because the exact pose needs the forward kinematics.
-pub(crate) fn closed_mouth(mechanism: &Mechanism, leg_m: f64, offset_m: [f64; 3]) -> Pose {
-    Translation3::from(offset_m) * level(mechanism, leg_m)
-}
-
-/// The platform level on three legs of that mean length, turned as the hinges are and above their middle.
-pub(crate) fn level(mechanism: &Mechanism, leg_m: f64) -> Pose {
+/// The platform level on three legs of that mean length, turned as the hinges are, and shifted from above their middle. For a
+/// mechanism of unequal sides the level pose is an approximation of the closed mouth, whose exact pose needs the forward
+/// kinematics.
+pub(crate) fn level(mechanism: &Mechanism, leg_m: f64, offset_m: [f64; 3]) -> Pose {
     let hinges = frame_of_corners(&std::array::from_fn(|leg| mechanism.hinge(leg, 0.0)));
     let at_height = |height_m: f64| Pose::translation(0.0, 0.0, height_m) * hinges;
     let mean_leg_m = |height_m: f64| {
@@ -310,7 +306,7 @@ pub(crate) fn level(mechanism: &Mechanism, leg_m: f64) -> Pose {
         let middle_m = f64::midpoint(low_m, high_m);
         if mean_leg_m(middle_m) < leg_m { low_m = middle_m } else { high_m = middle_m }
     }
-    at_height(low_m)
+    Translation3::from(offset_m) * at_height(low_m)
 }
 
 #[cfg(test)]
@@ -356,7 +352,7 @@ mod resting_tests {
     /// Joint coordinates of a scenario's platform, level on its initial legs.
     fn level_joints(scenario: &Scenario) -> Joints {
         let mechanism = Mechanism::new(&scenario.mechanism).unwrap();
-        mechanism.inverse(&level(&mechanism, scenario.dynamics.initial_leg_m)).unwrap()
+        mechanism.inverse(&level(&mechanism, scenario.dynamics.initial_leg_m, [0.0; 3])).unwrap()
     }
 
     #[test]

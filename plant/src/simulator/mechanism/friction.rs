@@ -25,14 +25,9 @@ pub(super) struct Braking {
     config: FrictionConfig,
     masses_kg: Vector6<f64>,
     loads: Loads,
-    bristles: [Bristles; AXES],
-}
-
-/// The bristles of an axis (LuGre; Canudas de Wit et al., IEEE Trans. Automatic Control 40, 1995), whose stiffness grows
-/// with the load as Coulomb friction does.
-#[derive(Debug, Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
-struct Bristles {
-    deflection_m: f64,
+    /// Deflection of the bristles of each axis (LuGre; Canudas de Wit et al., IEEE Trans. Automatic Control 40, 1995), m. Their
+    /// stiffness grows with the load as Coulomb friction does.
+    bristles_m: [f64; AXES],
 }
 
 impl Braking {
@@ -43,7 +38,7 @@ impl Braking {
             config: config.friction,
             masses_kg: bodies.axis_mass_kg(),
             loads: Loads::default(),
-            bristles: [Bristles::default(); AXES],
+            bristles_m: [0.0; AXES],
         }
     }
 
@@ -76,7 +71,7 @@ impl Braking {
     fn bristled(&self, axis: usize, coulomb_n: f64, speed_m_s: f64, step_s: f64) -> Element {
         let stiffness_n_per_m = coulomb_n / self.config.bristle_deflection_m;
         let slip = self.law.slip(speed_m_s, step_s);
-        let z_m = self.bristles[axis].deflection_m;
+        let z_m = self.bristles_m[axis];
         let next_m = (z_m + step_s * speed_m_s) / slip;
         // The damping fades with speed, so that sliding bristles do not drive the axis.
         let fading = (-(speed_m_s / self.config.breakaway_speed_m_s).powi(2)).exp();
@@ -106,8 +101,7 @@ impl Braking {
         }
         for axis in 0..AXES {
             let slip = self.law.slip(speeds_m_s[axis], step_s);
-            let bristles = &mut self.bristles[axis];
-            bristles.deflection_m = (bristles.deflection_m + step_s * speeds_m_s[axis]) / slip;
+            self.bristles_m[axis] = (self.bristles_m[axis] + step_s * speeds_m_s[axis]) / slip;
         }
     }
 }

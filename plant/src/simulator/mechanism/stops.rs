@@ -8,15 +8,10 @@ const MOST_N: f64 = 2000.0;
 /// A seized guide.
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub(super) struct Seizure {
-    held_at_m: f64,
+    pub(super) held_at_m: f64,
 }
 
 impl Seizure {
-    /// A guide that seizes at a position.
-    pub(super) fn at(position_m: f64) -> Self {
-        Self { held_at_m: position_m }
-    }
-
     /// The force on the axis in a step.
     pub(super) fn hold(&mut self, position_m: f64, speed_m_s: f64, step_s: f64) -> Element {
         // The spring slides along beyond the stretch of the largest force.
@@ -47,11 +42,6 @@ impl Stops {
         Self { low_m, high_m, spring }
     }
 
-    /// Stops of steel at these positions.
-    pub(super) fn steel(ends_m: [f64; 2]) -> Self {
-        Self::between(ends_m, CONTACT)
-    }
-
     /// The force on the axis in a step; `None` if the axis touches no stop before its end.
     pub(super) fn touch(&self, position_m: f64, speed_m_s: f64, step_s: f64) -> Option<Element> {
         let next_m = position_m + speed_m_s * step_s;
@@ -74,7 +64,7 @@ mod tests {
     /// Where a mass is, and how fast, after so many steps of 125 µs under a load.
     fn after(steps: usize, mass_kg: f64, start_m_s: f64, load_n: f64) -> (f64, f64) {
         const STEP_S: f64 = 1.25e-4;
-        let mut seizure = Seizure::at(0.0);
+        let mut seizure = Seizure { held_at_m: 0.0 };
         let (mut position_m, mut speed_m_s) = (0.0, start_m_s);
         for _ in 0..steps {
             let Element { force_n, damping_n_s_per_m } = seizure.hold(position_m, speed_m_s, STEP_S);
@@ -106,7 +96,7 @@ mod tests {
 
     #[test]
     fn stops_push_back_and_never_pull() {
-        let stops = Stops::steel([-0.01, 0.01]);
+        let stops = Stops::between([-0.01, 0.01], CONTACT);
         let force_n = |position_m, speed_m_s| {
             stops.touch(position_m, speed_m_s, 1e-4).map_or(0.0, |contact| contact.force_n)
         };
