@@ -277,21 +277,10 @@ impl Master {
         }
     }
 
-    /// Stops the drives. Reports the first cause and the first refused command, but no consequences.
+    /// Stops the drives. Reports the first cause, the first refused command and a second master, but no consequences.
     fn fail(&mut self, now_ns: u64, subject: Subject, failure: &Failure) {
         if self.supervision.stop(failure.cause) {
             self.events.add(now_ns, subject, failure.event(EventKind::Fault));
-        }
-    }
-
-    /// Leaves the drives to another master, permanently.
-    fn yield_to_other_master(&mut self, now_ns: u64, bus: usize) {
-        if self.supervision.stop_permanently() {
-            self.events.add(
-                now_ns,
-                Subject::Bus(bus),
-                Failure::new(Cause::SecondMaster).event(EventKind::Fault),
-            );
         }
     }
 
@@ -390,7 +379,7 @@ impl Master {
         let sender = sender(cob);
         // Only a master sends SYNC and NMT, and this master does not receive its own frames.
         if matches!(cob, Cob::Sync | Cob::Nmt) || sender == Some(MASTER_NODE) {
-            return self.yield_to_other_master(time_ns, bus);
+            return self.fail(time_ns, Subject::Bus(bus), &Failure::new(Cause::SecondMaster));
         }
         let Some(id) = sender else { return };
         let Some(axis) = self.drives.iter().position(|drive| drive.address == Address { bus, node: id })

@@ -68,11 +68,15 @@ impl Supervision {
     }
 
     /// Stops the drives for a cause; returns whether the cause is new. A later cause is mostly a consequence of the first
-    /// and changes nothing, but a refused command is never a consequence.
+    /// and changes nothing, but a refused command and a second master are never a consequence.
     pub(super) fn stop(&mut self, cause: Cause) -> bool {
         if is_refusal(cause) {
             self.stop = Stop::Permanent;
             return !std::mem::replace(&mut self.has_refused, true);
+        }
+        // From now on another master may control the drives, also after another stop.
+        if cause == Cause::SecondMaster {
+            return std::mem::replace(&mut self.stop, Stop::Permanent) != Stop::Permanent;
         }
         let is_first = !self.is_stopped();
         if is_first {
@@ -87,11 +91,6 @@ impl Supervision {
             };
         }
         is_first
-    }
-
-    /// Stops the drives permanently, also after another stop. Returns whether the permanent stop is new.
-    pub(super) fn stop_permanently(&mut self) -> bool {
-        std::mem::replace(&mut self.stop, Stop::Permanent) != Stop::Permanent
     }
 
     /// Ends a stop.
@@ -249,8 +248,11 @@ mod supervision_tests {
                 assert!(supervision.is_stopped() && !supervision.may_boot(false), "{cause}");
                 assert_eq!(supervision.awaits_restoration(), !is_permanent, "{cause}");
                 assert_eq!(supervision.may_boot(true), !is_permanent, "{cause}");
-                assert_eq!(supervision.stop_permanently(), !is_permanent, "{cause}");
-                assert!(!supervision.stop_permanently() && !supervision.awaits_restoration(), "{cause}");
+                assert_eq!(supervision.stop(Cause::SecondMaster), !is_permanent, "{cause}");
+                assert!(
+                    !supervision.stop(Cause::SecondMaster) && !supervision.awaits_restoration(),
+                    "{cause}"
+                );
                 assert!(!supervision.may_boot(true), "{cause}");
             }
         }
