@@ -24,7 +24,6 @@ const HEAD: [&str; 6] = ["axis", "object", "wanted", "found", "configure", "deci
 pub(crate) type Surveys = [Option<Survey>; AXES];
 
 /// A line to the drives of a scenario.
-#[derive(Debug)]
 pub(crate) struct RobotLine {
     pub(crate) scenario: Scenario,
     pub(crate) line: Line,

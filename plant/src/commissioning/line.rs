@@ -2,9 +2,7 @@
 //!
 //! In every step of the commissioning, the line refuses to switch on a second drive.
 
-use std::fmt::{self, Debug, Formatter};
-use std::io;
-use std::io::Write;
+use std::io::{self, Write};
 
 use masseter_can::canopen::{
     AbortCode, Expedited, Nmt, NmtCommand, NmtTarget, NodeId, ObjectAddress, SdoRequest, sync,
@@ -40,15 +38,6 @@ pub struct Line {
     switched_on: Option<usize>,
     /// The ledger of old values; none if nobody needs old values after a kill.
     ledger: Option<Box<dyn Ledger>>,
-}
-
-impl Debug for Line {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Line")
-            .field("names", &self.traffic.names)
-            .field("switched_on", &self.switched_on)
-            .finish_non_exhaustive()
-    }
 }
 
 impl Line {
@@ -87,15 +76,9 @@ impl Line {
         &self.traffic.strangers
     }
 
-    /// Sends SYNC to the bus of an axis.
-    pub(super) fn send_sync(&mut self, axis: usize) -> Result<(), LineError> {
-        self.traffic.send(self.traffic.addresses[axis].bus, sync::frame())
-    }
-
-    /// Queues process data for the drive of an axis; returns when, ns.
-    pub(super) fn send_process_data(&mut self, axis: usize, rpdo: Frame) -> Result<u64, LineError> {
-        self.traffic.send(self.traffic.addresses[axis].bus, rpdo)?;
-        Ok(self.now_ns())
+    /// Queues a frame for the bus of an axis.
+    pub(super) fn send(&mut self, axis: usize, frame: Frame) -> Result<(), LineError> {
+        self.traffic.send(self.traffic.addresses[axis].bus, frame)
     }
 
     /// Listens for that long.
@@ -261,7 +244,7 @@ impl Line {
     /// none without process data.
     pub(super) fn sync_answer_ns(&mut self, axis: usize) -> Result<Option<u64>, LineError> {
         (self.traffic.sync_ns, self.traffic.heard[axis].process_data_ns) = (None, None);
-        self.send_sync(axis)?;
+        self.send(axis, sync::frame())?;
         self.listen_until(SYNC_NS, |line| line.heard(axis).process_data_ns.is_some())?;
         Ok(self.traffic.sync_answer_ns(axis))
     }

@@ -5,7 +5,7 @@
 //! fast a moving axis comes to rest.
 
 use masseter_can::canopen::{
-    AbortCode, Emergency, EmergencyCode, NmtCommand, NmtState, NodeId, ObjectAddress,
+    AbortCode, Emergency, EmergencyCode, NmtCommand, NmtState, NodeId, ObjectAddress, sync,
 };
 use masseter_can::cia402::{Controlword, DriveState};
 use masseter_can::{Frame, Rpdo1};
@@ -237,8 +237,9 @@ impl<'a> Proof<'a> {
         let frame: Frame = rpdo.frame(self.node, &mover.profile().pdos.rpdo1());
         let until_ns = mover.line.now_ns() + SENT_NS;
         loop {
-            mover.line.send_sync(mover.axis)?;
-            let queued_ns = mover.line.send_process_data(mover.axis, frame)?;
+            mover.line.send(mover.axis, sync::frame())?;
+            mover.line.send(mover.axis, frame)?;
+            let queued_ns = mover.line.now_ns();
             if queued_ns >= until_ns {
                 return Ok(queued_ns);
             }
@@ -256,7 +257,7 @@ impl<'a> Proof<'a> {
         let axis = mover.axis;
         loop {
             if self.silence == Silence::ProcessData {
-                mover.line.send_sync(axis)?;
+                mover.line.send(axis, sync::frame())?;
             }
             let state = match read_state(mover.line, axis) {
                 // 1029h may stop the node, whose SDO server is silent then.

@@ -64,7 +64,6 @@ pub enum WriteError {
 }
 
 /// Writes settings to one drive, and keeps a list of the changes.
-#[derive(Debug)]
 pub struct Writer<'a> {
     line: &'a mut Line,
     axis: usize,
