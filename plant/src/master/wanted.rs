@@ -211,50 +211,43 @@ pub(crate) fn may_keep(rule: ObjectRule, object: ObjectAddress) -> bool {
 /// The objects with the scenario's values, or with the profile's own value where the profile has one. The profile's
 /// further objects come last.
 fn objects(scenario: &Scenario, axis: usize) -> Result<Vec<Setting>, PlantError> {
-    let (profile, node) = (scenario.profile(axis), scenario.can.node_ids[axis]);
-    let known = known_objects(scenario, axis)?;
-    let mut wanted = Vec::with_capacity(known.len());
-    for (index, subindex, value, bytes, key) in known {
-        let object = ObjectAddress::new(index, subindex);
-        let config = in_this_run(profile.object(ObjectKey(object)).at_node(node), object, scenario)?;
-        let value = config.value.unwrap_or(value);
-        if config.rule == ObjectRule::Absent {
-            continue;
-        }
-        if !config.takes(value) {
-            return Err(beyond(profile, key, object, value, &config));
-        }
-        let rule = if may_lack(object, scenario) && config == ObjectConfig::default() {
-            ObjectRule::Optional
-        } else {
-            config.rule
-        };
-        wanted.push(Setting {
-            object: ObjectKey(object),
-            value: value as u32,
-            bytes,
-            rule,
-            key: key.to_owned(),
-        });
+    let profile = scenario.profile(axis);
+    let mut wanted = Vec::new();
+    for (index, subindex, value, bytes, key) in known_objects(scenario, axis)? {
+        let object = ObjectKey(ObjectAddress::new(index, subindex));
+        wanted.extend(setting(scenario, axis, object, Some((value, bytes)), key)?);
     }
     wanted.extend(offsets(profile));
-    for (&object, config) in &profile.objects {
-        let config = config.at_node(node);
-        let is_known = wanted.iter().any(|known| known.object == object);
-        let (Some(value), false, false) = (config.value, is_known, config.rule == ObjectRule::Absent) else {
-            continue;
-        };
-        let Some(bytes) = config.bytes else {
-            let reason = "enter bytes = 1 to 4: the rig does not know the object";
-            return Err(PlantError::Scenario(format!("drive_profile.objects.{object}: {reason}")));
-        };
-        if !config.takes(value) {
-            return Err(beyond(profile, "drive_profile.objects", object.0, value, &config));
+    for &object in profile.objects.keys() {
+        if !wanted.iter().any(|known: &Setting| known.object == object) {
+            wanted.extend(setting(scenario, axis, object, None, "drive_profile.objects")?);
         }
-        let (value, bytes, key) = (value as u32, bytes.into(), "drive_profile.objects".to_owned());
-        wanted.push(Setting { object, value, bytes, rule: config.rule, key });
     }
     Ok(wanted)
+}
+
+/// The setting of an object, of which the rig may know value and bytes; none where the profile leaves the object.
+fn setting(
+    scenario: &Scenario,
+    axis: usize,
+    object: ObjectKey,
+    known: Option<(i64, usize)>,
+    key: &str,
+) -> Result<Option<Setting>, PlantError> {
+    let (profile, node) = (scenario.profile(axis), scenario.can.node_ids[axis]);
+    let config = in_this_run(profile.object(object).at_node(node), object.0, scenario)?;
+    let value = config.value.or(known.map(|(value, _)| value));
+    let Some(value) = value.filter(|_| config.rule != ObjectRule::Absent) else { return Ok(None) };
+    let Some(bytes) = known.map(|(_, bytes)| bytes).or(config.bytes.map(usize::from)) else {
+        let reason = "enter bytes = 1 to 4: the rig does not know the object";
+        return Err(PlantError::Scenario(format!("drive_profile.objects.{object}: {reason}")));
+    };
+    if !config.takes(value) {
+        return Err(beyond(profile, key, object.0, value, &config));
+    }
+    let is_optional = may_lack(object.0, scenario) && config == ObjectConfig::default();
+    let rule = if is_optional { ObjectRule::Optional } else { config.rule };
+    Ok(Some(Setting { object, value: value as u32, bytes, rule, key: key.to_owned() }))
 }
 
 /// Offsets outside the process data: 0, instead of the last value of other process data. The torque offset of an
