@@ -160,17 +160,12 @@ pub fn store(line: &mut Line, axis: usize, config: StoreConfig) -> Result<(), St
     let until_ns = line.now_ns() + u64::from(timeout_ms) * MILLISECOND_NS;
     // Some drives give no answer before they are done.
     unless_silent(line.write(axis, object, SAVE, 4))?;
-    loop {
-        let read = line.read_number(axis, object);
-        if matches!(read, Ok(word) if word & 1 == 1) {
-            return Ok(());
-        }
-        if line.now_ns() >= until_ns {
-            read?;
-            return Err(StoreError::Late { axis, object, timeout_ms });
-        }
-        unless_silent(read)?;
-        line.listen(LOOK_NS)?;
+    let within_ns = until_ns.saturating_sub(line.now_ns());
+    let look = |line: &mut Line| unless_silent(line.read_number(axis, object));
+    match line.look_until(within_ns, LOOK_NS, look, |word| word.is_some_and(|word| word & 1 == 1))? {
+        Some(word) if word & 1 == 1 => Ok(()),
+        Some(_) => Err(StoreError::Late { axis, object, timeout_ms }),
+        None => Err(LineError::Sdo { axis, object, reason: SdoReason::Silent }.into()),
     }
 }
 
