@@ -221,7 +221,7 @@ impl<L: Link> PlantCore<L> {
 
     /// Hands out the events since the last drain.
     pub fn drain_events(&mut self, out: &mut impl FnMut(Event)) {
-        self.injector.drain_events(out);
+        self.injector.events.drain(out);
         self.wire_events.drain(out);
         self.master.drain_events(out);
     }
@@ -246,7 +246,7 @@ impl<L: Link> PlantCore<L> {
             }
         }
         while let Some(mishap) = self.link.next_mishap() {
-            self.injector.note_mishap(Event { cycle: self.cycle, ..mishap });
+            self.injector.events.add(Event { cycle: self.cycle, ..mishap });
         }
         if !self.injector.is_empty() {
             self.follow_injections();

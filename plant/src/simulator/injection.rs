@@ -10,7 +10,7 @@ use std::ops::Range;
 
 use masseter_runtime::injection::{Injected, Injection, Withdrawn};
 use masseter_runtime::messages::codes::ControllerState;
-use masseter_runtime::messages::{Command, Event, LAYOUT_VERSION};
+use masseter_runtime::messages::{Command, LAYOUT_VERSION};
 use masseter_scenario::{CommandFault, FaultConfig, FaultKindConfig, Scenario};
 
 use crate::{error::PlantError, master::events::Journal, master::link::Occurrence};
@@ -25,7 +25,7 @@ pub(crate) struct Injector {
     /// Whether a window may have become known since the last look.
     has_news: bool,
     commands: CommandFaults,
-    events: Journal,
+    pub(crate) events: Journal,
 }
 
 impl Injector {
@@ -77,11 +77,6 @@ impl Injector {
         self.events.add(occurrence.event(cycle));
     }
 
-    /// Takes a mishap of the mechanism.
-    pub(crate) fn note_mishap(&mut self, mishap: Event) {
-        self.events.add(mishap);
-    }
-
     /// The next window that has become known.
     pub(crate) fn next_window(&mut self) -> Option<(Injected, Range<u64>)> {
         if !self.has_news {
@@ -119,11 +114,6 @@ impl Injector {
             events.add(occurrence.event(cycle));
         })
     }
-
-    /// Hands out the events since the last drain.
-    pub(crate) fn drain_events(&mut self, out: &mut impl FnMut(Event)) {
-        self.events.drain(out);
-    }
 }
 
 /// The entries of a scenario, each with whether the controller or the supervisor carries it out.
@@ -139,9 +129,7 @@ const FOREIGN_CYCLES: u64 = 1 << 40;
 
 /// The faults of the commands.
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
-pub(super) struct CommandFaults {
-    faults: Vec<AlteringFault>,
-}
+pub(super) struct CommandFaults(Vec<AlteringFault>);
 
 #[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
 struct AlteringFault {
@@ -171,12 +159,12 @@ impl CommandFaults {
                 is_acting: false,
             })
         };
-        Self { faults: list.iter().enumerate().filter_map(altering).collect() }
+        Self(list.iter().enumerate().filter_map(altering).collect())
     }
 
     /// Sets when a fault acts.
     pub(super) fn set_window(&mut self, injected: Injected, window_ns: &Range<u64>) {
-        for fault in self.faults.iter_mut().filter(|fault| fault.injected == injected) {
+        for fault in self.0.iter_mut().filter(|fault| fault.injected == injected) {
             let Range { start, end } = *window_ns;
             fault.window_ns = start..end.min(start.saturating_add(fault.longest_ns));
         }
@@ -192,7 +180,7 @@ impl CommandFaults {
         mut report: impl FnMut(Occurrence),
     ) -> Option<Command> {
         let mut command = received;
-        for fault in &mut self.faults {
+        for fault in &mut self.0 {
             let (injected, axis) = (fault.injected, fault.axis);
             let mut tell = |has_ended| report(Occurrence { injected, time_ns: now_ns, axis, has_ended });
             if fault.window_ns.contains(&sampled_ns) {

@@ -60,7 +60,7 @@ pub(super) struct AxisMotion {
 }
 
 /// The forces of the axes in a step.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 pub(super) struct AxesForces {
     /// Forces on the moving bodies at constant speeds, with those of the drives, N.
     pub(super) force_n: Vector6<f64>,
@@ -126,13 +126,7 @@ impl Axes {
         braking: &Braking,
         step_s: f64,
     ) -> AxesForces {
-        let mut forces = AxesForces {
-            force_n: Vector6::zeros(),
-            driven: [Element::default(); AXES],
-            braked: [Element::default(); AXES],
-            parted_kg: Vector6::zeros(),
-            resisting_kg: Vector6::zeros(),
-        };
+        let mut forces = AxesForces::default();
         let coulomb_n = braking.coulomb_n();
         for (number, axis) in self.each.iter_mut().enumerate() {
             let motion = AxisMotion { position_m: positions_m[number], speed_m_s: speeds_m_s[number] };

@@ -59,15 +59,14 @@ impl Coupling {
                 (position_m, speed_m_s, beyond_m + (ahead_m - ahead_m.clamp(-half_m, half_m)))
             }
         };
-        let (mass_kg, acceleration_m_s2, step) = (DRIVE_SHARE * axis_mass_kg, 0.0, Step::default());
         *self = Self::Loose(DriveSide {
             half_m,
             beyond_m,
-            mass_kg,
+            mass_kg: DRIVE_SHARE * axis_mass_kg,
             position_m,
             speed_m_s,
-            acceleration_m_s2,
-            step,
+            acceleration_m_s2: 0.0,
+            step: Step::default(),
         });
     }
 

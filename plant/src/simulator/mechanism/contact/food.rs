@@ -40,7 +40,7 @@ pub(crate) struct Food {
 }
 
 /// The part of a piece on one tooth.
-#[derive(Debug, Clone, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Default, serde::Serialize, serde::Deserialize)]
 pub(super) struct Column {
     /// The place of its tooth among the pairs.
     pair: usize,
@@ -56,13 +56,7 @@ impl Food {
     /// A fresh piece on teeth of an arch, given by their numbers. Teeth that the arch lacks carry nothing.
     pub(crate) fn new(config: &FoodConfig, arch: &[u8]) -> Self {
         let pair = |number: &u8| arch.iter().position(|tooth| tooth == number);
-        let column = |pair| Column {
-            pair,
-            thickness_m: 0.0,
-            compression_m: 0.0,
-            relaxing_m: 0.0,
-            grip: Grip::default(),
-        };
+        let column = |pair| Column { pair, ..Column::default() };
         Self {
             columns: config.teeth.iter().filter_map(pair).map(column).take(MOST_PAIRS).collect(),
             collected_m: config.thickness_m,
