@@ -103,16 +103,12 @@ fn services(node: NodeId, name: &str) -> [String; 4] {
     let (to_master, from_master) = ([name, MASTER], [MASTER, name]);
     let emergency = numbers([("Error_code", 16), ("Error_register", 8), ("Vendor", 40)]);
     let sdo = numbers([("Command", 8), ("Index", 16), ("Subindex", 8), ("Data", 32)]);
+    let heartbeat = numbers([("State", 8)]);
     [
         message(Cob::Emergency(node).into(), &format!("{name}_EMCY"), to_master, &emergency),
         message(Cob::SdoResponse(node).into(), &format!("{name}_SDO_response"), to_master, &sdo),
         message(Cob::SdoRequest(node).into(), &format!("{name}_SDO_request"), from_master, &sdo),
-        message(
-            Cob::Heartbeat(node).into(),
-            &format!("{name}_heartbeat"),
-            to_master,
-            &numbers([("State", 8)]),
-        ),
+        message(Cob::Heartbeat(node).into(), &format!("{name}_heartbeat"), to_master, &heartbeat),
     ]
 }
 

@@ -246,7 +246,8 @@ impl Line {
         (self.traffic.sync_ns, self.traffic.heard[axis].process_data_ns) = (None, None);
         self.send(axis, sync::frame())?;
         self.listen_until(SYNC_NS, |line| line.heard(axis).process_data_ns.is_some())?;
-        Ok(self.traffic.sync_answer_ns(axis))
+        let times_ns = self.heard(axis).process_data_ns.zip(self.traffic.sync_ns);
+        Ok(times_ns.map(|(begin_ns, sync_ns)| begin_ns.saturating_sub(sync_ns)))
     }
 
     /// Flushes the log to its file.

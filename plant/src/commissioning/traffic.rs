@@ -6,7 +6,7 @@ use std::{collections::BTreeSet, io::Write};
 
 use masseter_can::canopen::{Cob, Emergency, Heartbeat, NmtState, SdoResponse};
 use masseter_can::wire::{Bitrate, INTERFRAME_BITS, frame_bits};
-use masseter_can::{FULL_QUEUE, Frame, ReceiveError, Received, SendError, Tapped, TappedFrame, candump};
+use masseter_can::{Bus, FULL_QUEUE, Frame, ReceiveError, Received, SendError, Tapped, TappedFrame, candump};
 use masseter_model::geometry::AXES;
 use masseter_runtime::clock::{self, MILLISECOND_NS};
 use masseter_scenario::{MASTER_NODE, Scenario};
@@ -63,12 +63,6 @@ impl Traffic {
             bitrate: Bitrate::new(can.bitrate_bps)?,
             log,
         })
-    }
-
-    /// Time from the end of the last SYNC to the start of a drive's process data, ns; none if either is missing.
-    pub(super) fn sync_answer_ns(&self, axis: usize) -> Option<u64> {
-        let (begin_ns, sync_ns) = self.heard[axis].process_data_ns.zip(self.sync_ns)?;
-        Some(begin_ns.saturating_sub(sync_ns))
     }
 
     /// Sends the master's heartbeat from now on, with that interval.
@@ -288,14 +282,12 @@ impl Wires {
     }
 
     pub(super) fn send(&mut self, bus: usize, frame: Frame) -> Result<(), SendError> {
-        use masseter_can::Bus;
         let now_ns = self.now_ns();
         on_link!(self, link => link.port(bus).send(now_ns, frame))
     }
 
     /// The next frame of another node.
     pub(super) fn receive(&mut self, bus: usize) -> Result<Option<Received>, ReceiveError> {
-        use masseter_can::Bus;
         let now_ns = self.now_ns();
         on_link!(self, link => link.port(bus).receive(now_ns))
     }

@@ -123,15 +123,10 @@ pub(super) fn of_ratios(survey: &Survey, profile: &DriveProfile, increment_m: f6
     let feed = units.lead_m.map(|lead_m| lead_m / increment_m);
     let encoder = feed.map(|feed| feed / units.gear_ratio);
     let decides = |decides| if decides { Outcome::Refused } else { Outcome::Doubtful };
-    let lead_key = "drive_profile.units.lead_m";
+    let [gear_key, lead_key] = ["drive_profile.units.gear_ratio", "drive_profile.units.lead_m"];
+    let gear = Some(units.gear_ratio);
     let ratios = [
-        (
-            0x6091,
-            Some(units.gear_ratio),
-            "motor turns/screw turn",
-            decides(units.lead_m.is_some()),
-            "drive_profile.units.gear_ratio",
-        ),
+        (0x6091, gear, "motor turns/screw turn", decides(units.lead_m.is_some()), gear_key),
         (0x6092, feed, "increments/screw turn", Outcome::Refused, lead_key),
         (0x608F, encoder, "increments/motor turn", decides(ratio(0x6092).is_none()), lead_key),
     ];
