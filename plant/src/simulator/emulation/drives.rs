@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::{collections::BTreeMap, fs, io};
 
 use masseter_can::canopen::{NodeId, ObjectAddress};
-use masseter_drives::{DriveMemory, DriveSettings, Identity, Quirk, Ratings, SettingsError};
+use masseter_drives::{DriveMemory, DriveNode, DriveSettings, Identity, Quirk, Ratings, SettingsError};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_runtime::clock::SECOND_NS;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
@@ -163,19 +163,18 @@ impl MemoryFile {
         Ok(Self { path: path.to_owned(), drives, is_stale: false })
     }
 
-    /// Takes the stored values of a drive.
-    pub(super) fn set_of_axis(&mut self, axis: usize, memory: DriveMemory) {
-        self.drives[axis] = memory;
-        self.is_stale = true;
-    }
-
     /// The refusal of a drive's values in the file.
     pub(super) fn refuse(&self, axis: usize, reason: &SettingsError) -> PlantError {
         refused(&self.path, &format!("{}: {reason}", AXIS_NAMES[axis]))
     }
 
-    /// Writes the file, unless the file has the present values, as a whole or not at all.
-    pub(super) fn write_if_stale(&mut self) -> Result<(), PlantError> {
+    /// Takes what the drives have stored. Writes the file, unless the file has the present values, as a whole or not at all.
+    pub(super) fn save(&mut self, drives: &mut [DriveNode]) -> Result<(), PlantError> {
+        for (memory, drive) in self.drives.iter_mut().zip(drives) {
+            if let Some(changed) = drive.changed_memory() {
+                (*memory, self.is_stale) = (changed, true);
+            }
+        }
         if !self.is_stale {
             return Ok(());
         }

@@ -169,13 +169,7 @@ impl Emulation {
     /// # Errors
     /// [`PlantError::Memory`] for a file that cannot be written.
     pub fn save_memory(&mut self) -> Result<(), PlantError> {
-        let Some(memory) = &mut self.memory else { return Ok(()) };
-        for (axis, drive) in self.drives.iter_mut().enumerate() {
-            if let Some(changed) = drive.changed_memory() {
-                memory.set_of_axis(axis, changed);
-            }
-        }
-        memory.write_if_stale()
+        self.memory.as_mut().map_or(Ok(()), |memory| memory.save(&mut self.drives))
     }
 
     /// The mechanism's motion at the last SYNC.
