@@ -122,7 +122,7 @@ impl Analysis {
             interfaces: scenario.can.interfaces.clone(),
             timeline: Timeline::new(scenario, declared, pace),
             named: NamedWatch::new(declared),
-            shown: Some(Box::new(Shown::new(scenario))),
+            shown: Some(Box::new(Shown::new(scenario, declared.signals.len()))),
             axes: scenario.dry.is_on.then(|| AxisWatch::new(scenario)),
             tracking: Tracking::new(
                 if is_emulated { PoseSource::Truth } else { PoseSource::Estimate },
@@ -335,7 +335,7 @@ impl Analysis {
         let (stopped_by, enabled_cycles) = self.stop.into_figures();
         let enabled_s = enabled_cycles as f64 * self.period_ns as f64 / 1e9;
         if let Some(shown) = self.shown {
-            shown.add_to(&mut self.figures, self.declared.signals.len());
+            shown.add_to(&mut self.figures);
         }
         self.figures.events.sort_by_key(|event| event.time_ns);
         let overruns = longest_overruns([&mut self.controller_skips, &mut self.plant_skips]);

@@ -71,7 +71,7 @@ pub use poses::MOVING;
 pub use pressure::{Bearing, PressedTooth, Pressure};
 pub use recorded::{RecordedError, RecordedFigures, RecordedWatch};
 pub use response::{BusResponse, ResponseFigures};
-pub use series::Curve;
+pub use series::{Band, Curve};
 pub use skips::{OverrunAttribution, SkipFigures};
 pub use standstill::StandstillFigures;
 pub use statistic::{Statistic, student_t};

@@ -7,7 +7,7 @@ use masseter_runtime::messages::{Command, Contact, Reading, ToothContact};
 use masseter_scenario::{MOST_PAIRS, Scenario};
 use serde::Serialize;
 
-use crate::series::{ByCycle, Curve, Extremes, Series};
+use crate::series::{Band, ByCycle, Curve};
 
 /// What the teeth of the emulated jaw bore.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -63,7 +63,7 @@ pub(super) struct ContactWatch {
     total_max_n: f64,
     greatest: Contact,
     max_n: [f64; MOST_PAIRS],
-    courses: Series<Extremes<MOST_PAIRS>>,
+    courses: [Band; MOST_PAIRS],
     /// The newest message, which names the teeth.
     newest: Option<Contact>,
 }
@@ -77,7 +77,7 @@ impl ContactWatch {
             total_n += load_n;
             self.max_n[place] = self.max_n[place].max(load_n);
             if let Some(since_ns) = since_ns {
-                self.courses.add(since_ns, place, load_n);
+                self.courses[place].add(since_ns, load_n);
             }
         }
         if let Some(since_ns) = since_ns {
@@ -115,7 +115,7 @@ impl ContactWatch {
             place_m: tooth.place_m,
             max_n: self.max_n[place],
             at_total_max_n: greatest.get(place).map_or([0.0; 3], |tooth| tooth.force_n),
-            course_n: self.courses.highest(place),
+            course_n: self.courses[place].highest(),
         };
         Some(ContactFigures {
             total_max_n: self.total_max_n,

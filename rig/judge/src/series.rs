@@ -56,42 +56,44 @@ pub(super) trait Merge: Clone + Default {
 
 /// Stretches of equal width from a common beginning.
 #[derive(Debug, Clone)]
-pub(super) struct Series<T> {
+pub(super) struct Stretches<T> {
     width_ns: u64,
-    stretches: Vec<T>,
+    values: Vec<T>,
 }
 
-impl<T> Default for Series<T> {
+impl<T> Default for Stretches<T> {
     fn default() -> Self {
-        Self { width_ns: FIRST_WIDTH_NS, stretches: Vec::new() }
+        Self::of_width(FIRST_WIDTH_NS)
     }
 }
 
-impl<T: Merge> Series<T> {
+impl<T> Stretches<T> {
     /// Whose first stretches have this width, ns.
     pub(super) fn of_width(width_ns: u64) -> Self {
-        Self { width_ns, stretches: Vec::new() }
+        Self { width_ns, values: Vec::new() }
     }
+}
 
+impl<T: Merge> Stretches<T> {
     /// The stretch that holds this time since the beginning.
     pub(super) fn at(&mut self, since_ns: u64) -> &mut T {
         while since_ns / self.width_ns >= MOST_STRETCHES as u64 {
             self.join_pairs();
         }
         let place = (since_ns / self.width_ns) as usize;
-        if place >= self.stretches.len() {
-            self.stretches.resize(place + 1, T::default());
+        if place >= self.values.len() {
+            self.values.resize(place + 1, T::default());
         }
-        &mut self.stretches[place]
+        &mut self.values[place]
     }
 
     fn join_pairs(&mut self) {
-        let joined = self.stretches.chunks(2).map(|pair| {
+        let joined = self.values.chunks(2).map(|pair| {
             let mut joined = pair[0].clone();
             pair.iter().skip(1).for_each(|next| joined.merge(next));
             joined
         });
-        self.stretches = joined.collect();
+        self.values = joined.collect();
         self.width_ns *= 2;
     }
 
@@ -103,55 +105,8 @@ impl<T: Merge> Series<T> {
     /// Middle of each stretch, s since the beginning, and its values.
     pub(super) fn iter(&self) -> impl Iterator<Item = (f64, &T)> {
         let width_s = self.width_s();
-        let stretches = self.stretches.iter().enumerate();
+        let stretches = self.values.iter().enumerate();
         stretches.map(move |(place, stretch)| ((place as f64 + 0.5) * width_s, stretch))
-    }
-}
-
-impl<const N: usize> Series<Extremes<N>> {
-    /// Takes one of the values of a time since the beginning; NaN and infinite values are left out.
-    pub(super) fn add(&mut self, since_ns: u64, index: usize, value: f64) {
-        if value.is_finite() {
-            let point = (since_ns as f64 / 1e9, value);
-            self.at(since_ns).add(index, Span { lowest: point, highest: point });
-        }
-    }
-
-    /// Takes the values of a time that stand at `first` and behind.
-    pub(super) fn add_all(&mut self, since_ns: u64, first: usize, values: &[f64]) {
-        (first..).zip(values).for_each(|(index, value)| self.add(since_ns, index, *value));
-    }
-
-    /// Whether the stretch of a time since the beginning has this value.
-    pub(super) fn has_value(&self, index: usize, since_ns: u64) -> bool {
-        let stretch = self.stretches.get((since_ns / self.width_ns) as usize);
-        stretch.is_some_and(|stretch| stretch.0[index].is_some())
-    }
-
-    /// The bands at `first` and behind.
-    pub(super) fn bands<const M: usize>(&self, first: usize) -> [Curve; M] {
-        std::array::from_fn(|place| self.band(first + place))
-    }
-
-    /// Highest value of each stretch.
-    pub(super) fn highest(&self, index: usize) -> Curve {
-        self.spans(index).map(|span| span.highest).collect()
-    }
-
-    /// Lowest and highest value of each stretch, each at its own time. So a curve that only rises or only falls within
-    /// its stretches is drawn as it is.
-    pub(super) fn band(&self, index: usize) -> Curve {
-        let mut band = Curve::new();
-        for Span { lowest, highest } in self.spans(index) {
-            let is_rising = lowest.0 <= highest.0;
-            band.extend(if is_rising { [lowest, highest] } else { [highest, lowest] });
-        }
-        band.dedup();
-        band
-    }
-
-    fn spans(&self, index: usize) -> impl Iterator<Item = Span> {
-        self.stretches.iter().filter_map(move |stretch| stretch.0[index])
     }
 }
 
@@ -162,19 +117,10 @@ struct Span {
     highest: Point,
 }
 
-/// Smallest and largest of each of `N` values; none before the first.
-#[derive(Debug, Clone)]
-pub(super) struct Extremes<const N: usize>([Option<Span>; N]);
-
-impl<const N: usize> Default for Extremes<N> {
-    fn default() -> Self {
-        Self([None; N])
-    }
-}
-
-impl<const N: usize> Extremes<N> {
-    fn add(&mut self, index: usize, next: Span) {
-        let span = self.0[index].get_or_insert(next);
+impl Merge for Option<Span> {
+    fn merge(&mut self, next: &Self) {
+        let Some(next) = next else { return };
+        let span = self.get_or_insert(*next);
         if next.lowest.1 < span.lowest.1 {
             span.lowest = next.lowest;
         }
@@ -184,13 +130,54 @@ impl<const N: usize> Extremes<N> {
     }
 }
 
-impl<const N: usize> Merge for Extremes<N> {
-    fn merge(&mut self, next: &Self) {
-        for (index, span) in next.0.iter().enumerate() {
-            if let Some(span) = span {
-                self.add(index, *span);
-            }
+/// A value over time, as the lowest and the highest of each stretch.
+#[derive(Debug, Clone, Default)]
+pub struct Band(Stretches<Option<Span>>);
+
+impl Band {
+    /// Whose first stretches have this width, ns.
+    pub(super) fn of_width(width_ns: u64) -> Self {
+        Self(Stretches::of_width(width_ns))
+    }
+
+    /// Takes the value of a time since the beginning; NaN and infinite values are left out.
+    pub(super) fn add(&mut self, since_ns: u64, value: f64) {
+        if value.is_finite() {
+            let point = (since_ns as f64 / 1e9, value);
+            self.0.at(since_ns).merge(&Some(Span { lowest: point, highest: point }));
         }
+    }
+
+    /// Takes the values of a time, each into its band.
+    pub(super) fn add_all(bands: &mut [Self], since_ns: u64, values: &[f64]) {
+        bands.iter_mut().zip(values).for_each(|(band, value)| band.add(since_ns, *value));
+    }
+
+    /// Whether the stretch of a time since the beginning has a value.
+    pub(super) fn has_value(&self, since_ns: u64) -> bool {
+        let stretch = self.0.values.get((since_ns / self.0.width_ns) as usize);
+        stretch.is_some_and(Option::is_some)
+    }
+
+    /// Highest value of each stretch.
+    pub fn highest(&self) -> Curve {
+        self.spans().map(|span| span.highest).collect()
+    }
+
+    /// Lowest and highest value of each stretch, each at its own time. So a curve that only rises or only falls within
+    /// its stretches is drawn as it is.
+    pub fn curve(&self) -> Curve {
+        let mut curve = Curve::new();
+        for Span { lowest, highest } in self.spans() {
+            let is_rising = lowest.0 <= highest.0;
+            curve.extend(if is_rising { [lowest, highest] } else { [highest, lowest] });
+        }
+        curve.dedup();
+        curve
+    }
+
+    fn spans(&self) -> impl Iterator<Item = Span> {
+        self.0.values.iter().copied().flatten()
     }
 }
 

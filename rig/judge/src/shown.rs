@@ -8,7 +8,7 @@ use crate::figures::Figures;
 use crate::intervals::Intervals;
 use crate::jaw_cycles::{JawCycles, MotionSpeed};
 use crate::longest_cycles::LongestCycles;
-use crate::over_time::{CONTROLLER, OverTimeCollector, PLANT, Place};
+use crate::over_time::{CONTROLLER, OverTime, PLANT, Place};
 use crate::poses::{estimated_pose, is_running, true_pose};
 use crate::signals::CycleMessages;
 use crate::tracking::PathSample;
@@ -20,17 +20,19 @@ pub(super) struct Shown {
     has_truth: bool,
     intervals: Intervals,
     pub(super) longest_cycles: LongestCycles,
-    pub(super) over_time: OverTimeCollector,
+    pub(super) over_time: OverTime,
     jaw_cycles: JawCycles,
 }
 
 impl Shown {
-    pub(super) fn new(scenario: &Scenario) -> Self {
+    /// For a run whose controller declares so many signals.
+    pub(super) fn new(scenario: &Scenario, signals: usize) -> Self {
+        let (incisal_m, bitrate) = (scenario.jaw.reference_point_m, scenario.can.bitrate().ok());
         Self {
             has_truth: scenario.can.is_virtual(),
             intervals: Intervals::new(scenario.period_ns()),
             longest_cycles: LongestCycles::default(),
-            over_time: OverTimeCollector::new(scenario.jaw.reference_point_m, scenario.can.bitrate().ok()),
+            over_time: OverTime::new(incisal_m, bitrate, signals),
             jaw_cycles: JawCycles::new(scenario),
         }
     }
@@ -82,11 +84,11 @@ impl Shown {
         self.over_time.incisal(Place::Actual, truth.sampled_ns, true_pose(truth).as_ref());
     }
 
-    /// Adds the figures, with the curves of so many signals.
-    pub(super) fn add_to(self, figures: &mut Figures, signals: usize) {
+    /// Adds the figures.
+    pub(super) fn add_to(self, figures: &mut Figures) {
         figures.intervals = self.intervals.into_figures();
         figures.worst_cycles = self.longest_cycles.into_figures();
-        figures.over_time = self.over_time.into_figures(signals);
+        figures.over_time = self.over_time;
         figures.jaw_cycles = self.jaw_cycles.into_figures();
     }
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::Context;
 use masseter_controller::motion_controller::MotionController;
-use masseter_judge::{Analysis, Bearing, Curve, Figures, PressedTooth, ToothFigures};
+use masseter_judge::{Analysis, Band, Bearing, Curve, Figures, PressedTooth, ToothFigures};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plan::RunPlan;
 use masseter_recording::Manifest;
@@ -59,7 +59,7 @@ pub(crate) fn play() -> anyhow::Result<[(&'static str, String); 5]> {
     let bitten = bitten.flat_map(|((food, _), forces)| curves(food, FORCES.into_iter().zip(forces)));
     let (manifest, pressed) = run(PRESSED)?;
     let contact = pressed.contact.as_ref().context("the jaws have not touched")?;
-    let at_s = contact.total_max_at_ns.saturating_sub(pressed.over_time.began_ns) as f64 / 1e9;
+    let at_s = contact.total_max_at_ns.saturating_sub(pressed.over_time.began_ns()) as f64 / 1e9;
     let bite_n = pressed.bite_force_max_n.context("the jaws have not bitten")?;
     let teeth = PressedTooth::all(&manifest.scenario);
     let cusp = teeth.first().and_then(|tooth| tooth.cusp).context("the jaws have no teeth that meet")?;
@@ -141,8 +141,9 @@ type CycleForces = [Curve; AXES];
 fn cycle_forces(figures: &Figures) -> anyhow::Result<CycleForces> {
     let began = figures.events.iter().find(|event| event.enters(ControllerState::Running));
     let began_ns = began.context("the motion of a run has not begun")?.time_ns;
-    let from_s = (began_ns - figures.over_time.began_ns) as f64 / 1e9 + CHEWING_CYCLE_S;
-    Ok(figures.over_time.force_n.each_ref().map(|curve| cut(curve, from_s, from_s + CHEWING_CYCLE_S, from_s)))
+    let from_s = (began_ns - figures.over_time.began_ns()) as f64 / 1e9 + CHEWING_CYCLE_S;
+    let part = |band: &Band| cut(&band.curve(), from_s, from_s + CHEWING_CYCLE_S, from_s);
+    Ok(figures.over_time.force_n.each_ref().map(part))
 }
 
 /// The part of a curve between two times, which counts from a third.
@@ -156,7 +157,9 @@ fn bite((manifest, figures): &(Manifest, Figures)) -> anyhow::Result<[Curve; 3]>
     let over_time = &figures.over_time;
     let signal = |name: &str| {
         let place = manifest.declared.signals.iter().position(|signal| signal.name == name);
-        place.map(|place| &over_time.signals[place]).with_context(|| format!("a run has no signal {name}"))
+        place
+            .map(|place| over_time.signals[place].curve())
+            .with_context(|| format!("a run has no signal {name}"))
     };
     let (desired, estimated) = (signal("desired_bite_force_n")?, signal("bite_force_n")?);
     let is_bite = |point: &(f64, f64)| point.1 > 0.0;
@@ -164,6 +167,6 @@ fn bite((manifest, figures): &(Manifest, Figures)) -> anyhow::Result<[Curve; 3]>
     let from_s = starts.map(|pair| pair[1].0).nth(1).context("a run has no second bite")?;
     let after = desired.iter().find(|point| point.0 > from_s && !is_bite(point));
     let to_s = after.context("a run ends within a bite")?.0;
-    let curves = [desired, &over_time.bite_force_n, estimated];
-    Ok(curves.map(|curve| cut(curve, from_s - AROUND_S, to_s + AROUND_S, from_s)))
+    let curves = [desired, over_time.bite_force_n.curve(), estimated];
+    Ok(curves.map(|curve| cut(&curve, from_s - AROUND_S, to_s + AROUND_S, from_s)))
 }

@@ -8,8 +8,7 @@ use super::condition::{Lookup, Moment};
 use super::finding::{Finding, OfKey, Reason, Refused, RequirementPlot};
 use super::{dimension::BaseExponents, expression::Expression, missing::Missing, trigger::Window};
 use crate::breach::{Breach, widen};
-use crate::series::{Extremes, Series};
-use crate::{signals::Values, statistic::Sums};
+use crate::{series::Band, signals::Values, statistic::Sums};
 
 /// A signal or an expression.
 #[derive(Debug, Clone)]
@@ -118,7 +117,7 @@ pub(super) struct Bounds {
     fails_undisturbed: bool,
     /// Every value, for a percentile alone.
     values: Vec<f64>,
-    series: Series<Extremes<1>>,
+    series: Band,
     began_ns: Option<u64>,
 }
 
@@ -190,7 +189,7 @@ impl Bounds {
             span_ns: None,
             fails_undisturbed: false,
             values: Vec::new(),
-            series: Series::default(),
+            series: Band::default(),
             began_ns: None,
         })
     }
@@ -234,7 +233,7 @@ impl Bounds {
         self.missing.count_sample(value.is_some(), moment.phase, moment.is_real_time);
         let Some(value) = value else { return };
         // What the requirement does not judge would only spoil the scale of the plot.
-        self.series.add(moment.time_ns - began_ns, 0, value / self.of.unit.si);
+        self.series.add(moment.time_ns - began_ns, value / self.of.unit.si);
         let value = if self.statistic == Statistic::Abs { value.abs() } else { value };
         self.sums.add(value);
         if self.statistic == Statistic::Percentile {
@@ -255,7 +254,7 @@ impl Bounds {
     /// The signal over time, with its limits and the statistic that was judged.
     pub(super) fn plot(&mut self) -> RequirementPlot {
         let si = self.of.unit.si;
-        let curve = self.series.band(0);
+        let curve = self.series.curve();
         let is_signed = curve.iter().any(|(_, value)| *value < 0.0);
         let both_sides = |value: f64| if is_signed { vec![value, -value] } else { vec![value] };
         let limits = [self.limits.min, self.limits.max].into_iter().flatten().map(|limit| limit / si);

@@ -41,28 +41,28 @@ mod series {
 
     #[test]
     fn a_long_run_keeps_its_extremes_at_their_times() {
-        let mut series = Series::<Extremes<1>>::default();
+        let mut series = Band::default();
         for millisecond in 0..100_000u64 {
             let value = if millisecond == 54_321 { 99.0 } else { (millisecond % 7) as f64 };
-            series.add(millisecond * 1_000_000, 0, value);
+            series.add(millisecond * 1_000_000, value);
         }
-        let band = series.band(0);
+        let band = series.curve();
         assert!(band.len() <= 2 * MOST_STRETCHES && band.is_sorted_by(|a, b| a.0 < b.0));
         assert_eq!(band.iter().filter(|(_, value)| *value > 98.0).collect::<Vec<_>>(), [&(54.321, 99.0)]);
-        assert!(series.highest(0).iter().all(|(_, value)| *value >= 6.0));
-        assert_eq!(series.stretches.len(), band.iter().filter(|(_, value)| *value < 0.5).count());
+        assert!(series.highest().iter().all(|(_, value)| *value >= 6.0));
+        assert_eq!(series.0.values.len(), band.iter().filter(|(_, value)| *value < 0.5).count());
     }
 
     /// Chewing, with flanks that fall through many stretches of time.
     #[test]
     fn every_point_of_a_curve_is_a_point_of_its_signal() {
         let signal = |at_s: f64| 20.0 * (std::f64::consts::TAU * at_s / 0.7).cos();
-        let mut series = Series::<Extremes<1>>::default();
+        let mut series = Band::default();
         for millisecond in 0..60_000u64 {
-            series.add(millisecond * 1_000_000, 0, signal(millisecond as f64 / 1e3));
+            series.add(millisecond * 1_000_000, signal(millisecond as f64 / 1e3));
         }
-        let band = series.band(0);
-        assert!(series.width_ns > 4 * FIRST_WIDTH_NS, "each stretch holds many values");
+        let band = series.curve();
+        assert!(series.0.width_ns > 4 * FIRST_WIDTH_NS, "each stretch holds many values");
         for (at_s, value) in &band {
             assert!((value - signal(*at_s)).abs() < 1e-9, "{value} at {at_s} s");
         }
@@ -78,16 +78,16 @@ mod series {
 
     #[test]
     fn a_curve_of_one_value_is_a_straight_line_and_no_number_is_left_out() {
-        let mut series = Series::<Extremes<1>>::default();
+        let mut series = Band::default();
         for (microsecond, value) in [(0, 1.0), (1, f64::NAN), (2, f64::INFINITY), (3, 1.0), (1000, 1.0)] {
-            series.add(microsecond * 1000, 0, value);
+            series.add(microsecond * 1000, value);
         }
-        assert_eq!(series.band(0), [(0.0, 1.0), (0.001, 1.0)]);
+        assert_eq!(series.curve(), [(0.0, 1.0), (0.001, 1.0)]);
     }
 
     #[test]
     fn nothing_is_lost_from_a_sum() {
-        let mut series = Series::<u64>::default();
+        let mut series = Stretches::<u64>::default();
         (0..50_000u64).for_each(|millisecond| *series.at(millisecond * 1_000_000) += 3);
         assert_eq!(series.iter().map(|(_, sum)| sum).sum::<u64>(), 150_000);
     }

@@ -253,7 +253,7 @@ fn list_events(
         writeln!(text, "\n{heading}:")?;
     }
     let over_time = &figures.over_time;
-    let zero_ns = over_time.motion_began_ns.unwrap_or(over_time.began_ns);
+    let zero_ns = over_time.motion_began_ns.unwrap_or_else(|| over_time.began_ns());
     events.try_for_each(|event| {
         let at_s = (event.time_ns as f64 - zero_ns as f64) / 1e9;
         writeln!(text, "  {at_s:>8.3} s  {}", event.in_words())

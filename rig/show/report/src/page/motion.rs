@@ -6,7 +6,7 @@ use std::ops::Range;
 
 use masseter_controller::trajectory::closed_pose;
 use masseter_judge::{
-    Course, CoursePoint, Curve, Figures, JawCycleFigures, JawCycleGroup, PoseSource, RecordedError,
+    Band, Course, CoursePoint, Figures, JawCycleFigures, JawCycleGroup, PoseSource, RecordedError,
     RecordedFigures, ToothFigures, ToothLoads, TrackingSample, closed_incisal_m,
 };
 use masseter_model::geometry::{AXES, AXIS_NAMES, LEGS, Mechanism, Pose};
@@ -36,8 +36,8 @@ pub(super) fn mechanism_section(scenario: &Scenario, figures: &Figures) -> Optio
 
 pub(super) fn motion_section(scenario: &Scenario, figures: &Figures) -> Section {
     let over_time = &figures.over_time;
-    let error = |title: &str, unit: &str, curve: &Curve, factor: f64| Chart {
-        series: vec![plain("distance", curve, factor)],
+    let error = |title: &str, unit: &str, band: &Band, factor: f64| Chart {
+        series: vec![plain("distance", &band.highest(), factor)],
         otherwise: "There was no desired motion.".to_owned(),
         ..Chart::over_time(title, unit)
     };
@@ -60,21 +60,20 @@ pub(super) fn motion_section(scenario: &Scenario, figures: &Figures) -> Section 
         blocks.extend([along(2), along(0).half(), along(1).half()]);
     }
     if figures.bite_force_max_n.is_some() {
-        let mut series = vec![plain("bite force", &over_time.bite_force_n, 1.0)];
+        let mut series = vec![plain("bite force", &over_time.bite_force_n.curve(), 1.0)];
         let shown =
             [("bite_force_n", "estimate"), ("bite_force_uncertainty_n", "uncertainty of the estimate")];
         let place = |name: &str| figures.signals.iter().position(|of| of.signal.name == name);
-        series.extend(
-            shown
-                .into_iter()
-                .filter_map(|(signal, name)| Some(plain(name, over_time.signals.get(place(signal)?)?, 1.0))),
-        );
+        series.extend(shown.into_iter().filter_map(|(signal, name)| {
+            Some(plain(name, &over_time.signals.get(place(signal)?)?.curve(), 1.0))
+        }));
         let force = Chart { series, ..Chart::over_time("Bite force, vertical", "N") };
         blocks.push(Block::chart("bite", force));
     }
     if figures.tracking.actual_source.is_truth() {
         let names = ["drives", "friction", "food, teeth and others", "motion and height: their sum"];
-        let series = names.iter().zip(&over_time.energy_j).map(|(name, curve)| plain(name, curve, 1.0));
+        let series =
+            names.iter().zip(&over_time.energy_j).map(|(name, band)| plain(name, &band.curve(), 1.0));
         let energy = Chart {
             series: series.collect(),
             ..Chart::over_time("Work on the mechanism since the start", "J")
@@ -103,8 +102,8 @@ fn recorded_blocks(figures: &RecordedFigures) -> [Block; 2] {
 /// Desired, actual and estimated displacement of the incisal point from the closed jaw, along one direction.
 fn displacement(figures: &Figures, axis: usize, closed_m: f64) -> Chart {
     let over_time = &figures.over_time;
-    let series = |name: &str, style: Style, curves: &[Curve; 3]| {
-        Series::new(name, style, Points::over_time(&in_unit(&curves[axis], closed_m, 1e3)))
+    let series = |name: &str, style: Style, bands: &[Band; 3]| {
+        Series::new(name, style, Points::over_time(&in_unit(&bands[axis].curve(), closed_m, 1e3)))
     };
     let source = figures.tracking.actual_source;
     let mut all = vec![series("desired", Style::Desired, &over_time.desired_incisal_m)];
@@ -193,7 +192,7 @@ pub(super) fn animation_data(scenario: &Scenario, figures: &Figures) -> Option<V
     let samples = &figures.track;
     samples.first()?;
     let source = figures.tracking.actual_source;
-    let frame = |sample| frame(sample, figures.over_time.began_ns, source);
+    let frame = |sample| frame(sample, figures.over_time.began_ns(), source);
     let contact = figures.contact.as_ref();
     let tooth = |tooth: &ToothConfig| (tooth.number, tooth.point_m.map(rounded));
     let animation = Animation {
@@ -328,16 +327,16 @@ pub(super) fn actuators_section(scenario: &Scenario, figures: &Figures) -> Secti
     Section::new("actuators", "Actuators", blocks)
 }
 
-fn curve_chart(kind: Kind, quantity: &str, unit: &str, si: &[Curve; AXES], limits: Vec<Limit>) -> Chart {
-    let series = kind.axes().map(|axis| plain(AXIS_NAMES[axis], &si[axis], 1e3)).collect();
+fn curve_chart(kind: Kind, quantity: &str, unit: &str, si: &[Band; AXES], limits: Vec<Limit>) -> Chart {
+    let series = kind.axes().map(|axis| plain(AXIS_NAMES[axis], &si[axis].curve(), 1e3)).collect();
     Chart { series, limits, ..Chart::over_time(format!("{quantity} of the {}", kind.name()), unit) }
 }
 
 /// Pale raw forces under their moving means.
 fn force_chart(kind: Kind, figures: &Figures, limits: Vec<Limit>) -> Chart {
     let over_time = &figures.over_time;
-    let series = |name: String, style: Style, place: usize, curve: &Curve| {
-        Series::new(name, style, Points::over_time(curve)).coloured(place)
+    let series = |name: String, style: Style, place: usize, band: &Band| {
+        Series::new(name, style, Points::over_time(&band.curve())).coloured(place)
     };
     let raw = kind.axes().enumerate().map(|(place, axis)| {
         series(format!("{} raw", AXIS_NAMES[axis]), Style::Raw, place, &over_time.force_n[axis])

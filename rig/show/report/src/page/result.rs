@@ -258,8 +258,8 @@ fn signals(signals: &[SignalFigures]) -> Table {
 /// One chart for each unit, in the order of the signals' declaration.
 fn signal_charts(figures: &Figures) -> Vec<Block> {
     let mut units: Vec<(&str, Vec<Series>)> = Vec::new();
-    for (SignalFigures { signal, .. }, curve) in figures.signals.iter().zip(&figures.over_time.signals) {
-        let series = plain(&signal.name, curve, 1.0);
+    for (SignalFigures { signal, .. }, band) in figures.signals.iter().zip(&figures.over_time.signals) {
+        let series = plain(&signal.name, &band.curve(), 1.0);
         match units.iter_mut().find(|(unit, _)| *unit == signal.unit) {
             Some((_, all)) => all.push(series),
             None => units.push((&signal.unit, vec![series])),

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use masseter_judge::{
-    BusResponse, Curve, Figures, IntervalFigures, ResponseFigures, TopicFigures, WorstCycle,
+    Band, BusResponse, Figures, IntervalFigures, ResponseFigures, TopicFigures, WorstCycle,
 };
 use masseter_page::{
     Across, Block, Cell, Chart, Column, Limit, Points, Scale, Section, Series, Style, Table, Tone,
@@ -96,15 +96,13 @@ fn budgets(scenario: &Scenario) -> Vec<Limit> {
 
 /// The latest wake-ups over time.
 fn wake_ups(figures: &Figures) -> Block {
-    let over_time = &figures.over_time;
-    let late = |(name, curve): (&str, &Curve)| {
-        let points: Vec<_> = curve.iter().map(|&(at_s, late_ns)| (at_s, in_us(late_ns))).collect();
-        Series::new(name, Style::Plain, Points::over_time(&points))
+    let late = |(name, band): (&str, &Band)| {
+        let late = band.highest().into_iter().map(|(at_s, late_ns)| (at_s, in_us(late_ns)));
+        Series::new(name, Style::Plain, Points::over_time(&late.collect::<Vec<_>>()))
     };
-    let curves = [("controller", &over_time.controller_late_ns), ("plant", &over_time.plant_late_ns)];
     let chart = Chart {
         scale: Scale::Log,
-        series: curves.map(late).into(),
+        series: ["controller", "plant"].into_iter().zip(&figures.over_time.late_ns).map(late).collect(),
         ..Chart::over_time("Latest wake-up after its deadline", "µs")
     };
     Block::chart("jitter", chart)
@@ -185,9 +183,9 @@ fn topics_in_words(topics: &[TopicFigures]) -> String {
 
 /// Share of each bus in use.
 fn load(figures: &Figures) -> Chart {
-    let loads = figures.over_time.bus_load.iter().enumerate();
+    let loads = figures.over_time.bus_load().enumerate();
     Chart {
-        series: loads.map(|(bus, load)| plain(&format!("can{bus}"), load, 100.0)).collect(),
+        series: loads.map(|(bus, load)| plain(&format!("can{bus}"), &load, 100.0)).collect(),
         limits: vec![limit("full", &[100.0])],
         otherwise: "No frame was recorded.".to_owned(),
         ..Chart::over_time("Load of the buses", "%")

@@ -1,6 +1,6 @@
 //! The stop of a run: the chain from the fault to the standstill, and axis and buses around the stop. Judges nothing.
 
-use masseter_judge::{Curve, EventRecord, FaultFigures, Figures};
+use masseter_judge::{Band, Curve, EventRecord, FaultFigures, Figures};
 use masseter_model::geometry::AXIS_NAMES;
 use masseter_page::{Block, Cell, Chart, Column, Moment, MomentKind, Points, Section, Series, Style, Table};
 use masseter_runtime::messages::codes::Source;
@@ -69,7 +69,8 @@ fn moments_of_stop(figures: &Figures) -> Vec<Moment> {
 
 /// When the last axis came to where it stands; none where one moves until its last position, or has none after the stop.
 fn standstill_s(figures: &Figures, reacted_s: f64) -> Option<f64> {
-    let stands_s = |curve: &Curve| {
+    let stands_s = |band: &Band| {
+        let curve = band.curve();
         let (end_s, end_m) = *curve.last()?;
         let moves = curve.iter().rev().find(|(_, position_m)| (position_m - end_m).abs() > STANDS_M);
         let at_s = moves.map_or(reacted_s, |(at_s, _)| at_s.max(reacted_s));
@@ -83,15 +84,17 @@ fn standstill_s(figures: &Figures, reacted_s: f64) -> Option<f64> {
 pub(super) fn chain(figures: &Figures, moments: &[Moment]) -> Option<Block> {
     let over_time = &figures.over_time;
     let first_s = moments.first()?.at_s;
+    let (incisal_m, distance_m) =
+        (over_time.actual_incisal_m.each_ref().map(Band::curve), over_time.distance_m.highest());
     let place_mm = |at_s: f64| {
-        let [x, y, z] = over_time.actual_incisal_m.each_ref().map(|curve| value_at(curve, at_s));
+        let [x, y, z] = incisal_m.each_ref().map(|curve| value_at(curve, at_s));
         Some([x?, y?, z?].map(|m| m * 1e3))
     };
     let row = |Moment { at_s, text, .. }: &Moment| -> [Cell; 5] {
         let moved_mm = place_mm(first_s).zip(place_mm(*at_s)).map(|(from, to)| {
             from.into_iter().zip(to).map(|(from, to)| (to - from).powi(2)).sum::<f64>().sqrt()
         });
-        let away_mm = value_at(&over_time.distance_m, *at_s).map(|m| m * 1e3);
+        let away_mm = value_at(&distance_m, *at_s).map(|m| m * 1e3);
         let [away, moved] = [away_mm, moved_mm].map(|mm| or_dash(mm, |mm| format!("{mm:.3}")));
         let after_ms = format!("{:.1}", (at_s - first_s) * 1e3);
         [Cell::Time { at_s: *at_s }, text.clone().into(), after_ms.into(), away.into(), moved.into()]
@@ -116,19 +119,19 @@ pub(super) fn stop_section(figures: &Figures) -> Option<Section> {
     };
     let axis = stop(figures)?.axis.and_then(|name| AXIS_NAMES.iter().position(|axis| *axis == name));
     let axis = axis.map(|axis| {
-        let mut both = vec![series("true", Style::True, &over_time.position_m[axis], 1e3)];
-        let reported = &over_time.reported_m[axis];
+        let mut both = vec![series("true", Style::True, &over_time.position_m[axis].curve(), 1e3)];
+        let reported = over_time.reported_m[axis].curve();
         if reported.is_empty() {
             "reported".clone_into(&mut both[0].name);
         } else {
-            both.push(series("reported", Style::Estimated, reported, 1e3));
+            both.push(series("reported", Style::Estimated, &reported, 1e3));
         }
         let title = format!("Position of {} around the stop", AXIS_NAMES[axis]);
         Block::chart("stop-axis", Chart { series: both, ..Chart::over_time(title, "mm") }).half()
     });
-    let loads = over_time.bus_load.iter().enumerate();
+    let loads = over_time.bus_load().enumerate();
     let loads: Vec<_> =
-        loads.map(|(bus, load)| series(&format!("can{bus}"), Style::Plain, load, 100.0)).collect();
+        loads.map(|(bus, load)| series(&format!("can{bus}"), Style::Plain, &load, 100.0)).collect();
     let buses = Chart { series: loads, ..Chart::over_time("Load of the buses around the stop", "%") };
     let buses = figures.frames.is_some().then(|| Block::chart("stop-buses", buses).half());
     let blocks: Vec<_> = axis.into_iter().chain(buses).collect();

@@ -13,13 +13,13 @@ pub(super) fn time(manifest: &Manifest, figures: &Figures) -> Time {
         motion_s: motion_s(figures),
         end_s: over_time.duration_s.max(last_s),
         period_s: manifest.scenario.period_ns() as f64 / 1e9,
-        wall_s: manifest.wall_ahead_ns.map(|ahead_ns| (over_time.began_ns as f64 + ahead_ns as f64) / 1e9),
+        wall_s: manifest.wall_ahead_ns.map(|ahead_ns| (over_time.began_ns() as f64 + ahead_ns as f64) / 1e9),
     }
 }
 
 /// An instant of the run's clock as a time of the page, s since the first SYNC.
 pub(super) fn since_s(figures: &Figures, time_ns: u64) -> f64 {
-    time_ns.saturating_sub(figures.over_time.began_ns) as f64 / 1e9
+    time_ns.saturating_sub(figures.over_time.began_ns()) as f64 / 1e9
 }
 
 /// The states of the controller, one after the other.
