@@ -329,7 +329,7 @@ mod tests {
         let root = Path::new(env!("CARGO_MANIFEST_DIR"));
         let reference = fs::read_to_string(root.join("docs/scenario.md")).unwrap();
         for step in NextStep::ALL {
-            let sentence = step.sentence();
+            let sentence = step.name();
             let is_apart = |c: char| c.is_whitespace() || "(),:;".contains(c);
             for document in sentence.split(is_apart).filter(|word| word.starts_with("docs/")) {
                 assert!(root.join(document.trim_end_matches('.')).is_file(), "{step:?}: {document}");

@@ -4,7 +4,7 @@ use std::{fs::File, path::Path};
 
 use anyhow::Context;
 use masseter_controller::process::BuildController;
-use masseter_judge::{Analysis, Figures, Judgement};
+use masseter_judge::{Analysis, Figures, Verdict};
 use masseter_plan::RunPlan;
 use masseter_recorder::live::ReportServer;
 use masseter_recording::{Ending, FullSpeed, Manifest, RunFolder};
@@ -114,8 +114,7 @@ impl PlayedRun {
         let Self { request, folder, manifest, reserved, report_server, written } = self;
         let detail = if request.verbose { Detail::Whole } else { Detail::Brief };
         let shown = Some((request.format, detail));
-        let judgement = masseter_report::report_run(&folder, &manifest, shown, reserved)?;
-        let exit = judgement.verdict.exit_code;
+        let exit = masseter_report::report_run(&folder, &manifest, shown, reserved)?.exit_code;
         if let Some(server) = report_server
             && let Ok(html) = read_text(&folder.file("report.html"), MOST_KEPT_BYTES)
         {
@@ -130,14 +129,14 @@ impl PlayedRun {
     }
 
     /// The same without printing; none for a run that was interrupted before anything was recorded.
-    pub(crate) fn judge_unseen(self) -> Result<Option<Judgement>, Failure> {
+    pub(crate) fn judge_unseen(self) -> Result<Option<Verdict>, Failure> {
         if self.is_unstarted() {
             return Ok(None);
         }
         let Self { folder, manifest, reserved, written, .. } = self;
-        let judgement = masseter_report::report_run(&folder, &manifest, None, reserved)?;
+        let verdict = masseter_report::report_run(&folder, &manifest, None, reserved)?;
         written?;
-        Ok(Some(judgement))
+        Ok(Some(verdict))
     }
 
     /// Whether it was interrupted before every process was ready: nothing is recorded.

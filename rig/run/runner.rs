@@ -8,7 +8,7 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow};
 use masseter_controller::process::BuildController;
-use masseter_judge::{Figures, Judgement, Verdict};
+use masseter_judge::{Figures, Verdict};
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure};
 use masseter_virtual_time::Requests;
@@ -103,7 +103,7 @@ impl Runner {
         file: ScenarioFile<'_>,
         clock: ClockKind,
         folder: &Path,
-    ) -> Result<Option<Judgement>, Failure> {
+    ) -> Result<Option<Verdict>, Failure> {
         let request = RunRequest { out: Some(folder.to_owned()), ..self.request(file, clock) };
         guarded(|| PreparedRun::new(&request)?.play(&self.interrupts)?.judge_unseen())
     }
@@ -116,7 +116,7 @@ impl Runner {
         file: ScenarioFile<'_>,
         folder: &Path,
         digest: &str,
-    ) -> Result<Option<Judgement>, Failure> {
+    ) -> Result<Option<Verdict>, Failure> {
         let again = self.record(file, ClockKind::Virtual, folder)?;
         let Some(again) = again.filter(|_| !self.is_interrupted()) else { return Ok(None) };
         if again.digest != digest {

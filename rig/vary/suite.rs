@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::anyhow;
-use masseter_judge::Judgement;
+use masseter_judge::Verdict;
 use masseter_report::suite::{Attempt, TestedScenario};
 use masseter_runtime::clock;
 use masseter_terminal::{Exit, Failure, in_one_line, status};
@@ -98,16 +98,14 @@ impl Suite<'_> {
     /// Runs a scenario without a recording. One that does not pass is run again with a recording: the same bytes.
     fn in_virtual_time(&self, case: &Case) -> Attempt {
         let played = self.runner.play(Source::File(case.file()));
-        let played =
-            played.map(|judged| Judgement { verdict: judged.verdict, digest: judged.figures.digest });
-        let attempt = attempt(played, None);
-        let Ok(unrecorded) = &attempt.judgement else { return attempt };
+        let attempt = attempt(played.map(|judged| judged.verdict), None);
+        let Ok(unrecorded) = &attempt.verdict else { return attempt };
         if !attempt.is_short(self.allows_untested) || self.runner.is_interrupted() {
             return attempt;
         }
         let folder = self.folder_of(case, 0);
         match self.runner.record_again("the run", case.file(), &folder, &unrecorded.digest) {
-            Ok(Some(again)) => Attempt { judgement: Ok(again), folder: Some(folder) },
+            Ok(Some(again)) => Attempt { verdict: Ok(again), folder: Some(folder) },
             Ok(None) => attempt,
             // The result is known without the recording.
             Err(failure) if failure.exit == Exit::Incomplete => {
@@ -127,7 +125,7 @@ impl Suite<'_> {
         loop {
             let folder = self.folder_of(case, attempts.len());
             let recorded = self.runner.record(case.file(), clock, &folder);
-            let judged = recorded.and_then(|judgement| judgement.ok_or_else(unstarted));
+            let judged = recorded.and_then(|verdict| verdict.ok_or_else(unstarted));
             attempts.push(attempt(judged, Some(folder)));
             let has_tries = attempts.len() <= self.retries && !self.runner.is_interrupted();
             if !has_tries || !asks_for_another(clock, &attempts, self.allows_untested) {
@@ -160,14 +158,14 @@ fn asks_for_another(clock: ClockKind, attempts: &[Attempt], allows_untested: boo
 }
 
 /// An attempt; its folder counts only if it exists.
-fn attempt(judged: Result<Judgement, Failure>, folder: Option<PathBuf>) -> Attempt {
-    let judgement = judged.map_err(|failure| in_one_line(&failure.error));
-    Attempt { judgement, folder: folder.filter(|folder| folder.exists()) }
+fn attempt(judged: Result<Verdict, Failure>, folder: Option<PathBuf>) -> Attempt {
+    let verdict = judged.map_err(|failure| in_one_line(&failure.error));
+    Attempt { verdict, folder: folder.filter(|folder| folder.exists()) }
 }
 
 #[cfg(test)]
 mod tests {
-    use masseter_judge::{Analysis, Verdict};
+    use masseter_judge::Analysis;
     use masseter_recording::{MachineInfo, Manifest};
     use masseter_runtime::named::Declared;
     use masseter_scenario::Scenario;
@@ -180,7 +178,8 @@ mod tests {
         let figures = Analysis::new(&manifest.scenario, &Declared::default()).finish(false, &[]);
         let mut verdict = Verdict::new(&manifest, &figures);
         verdict.exit_code = exit_code;
-        Attempt { judgement: Ok(Judgement { verdict, digest: digest.to_owned() }), folder: None }
+        digest.clone_into(&mut verdict.digest);
+        Attempt { verdict: Ok(verdict), folder: None }
     }
 
     #[test]

@@ -13,9 +13,9 @@ use crate::bite_estimate::BiteEstimateWatch;
 use crate::declared_faults::FaultWatch;
 use crate::events::{Code, EventRecord};
 use crate::figures::Figures;
-use crate::loads::{AxisWatch, ContactWatch};
+use crate::loads::AxisWatch;
 use crate::lost_cycles::{Disturbance, Freshness, OutageWatch, ScenarioStalls};
-use crate::messages::{Digest, NamedWatch, SequenceCheck};
+use crate::messages::{Digest, ParameterFigures, SequenceCheck, SignalFigures};
 use crate::overruns::LoopSamples;
 use crate::played::{MotionFigures, PlayedWatch, StopWatch};
 use crate::poses::is_running;
@@ -49,14 +49,13 @@ use crate::tracking::{PoseSource, Tracking};
 /// assert_eq!((figures.cycles, figures.missing_messages()), (3, 0));
 /// # Ok::<(), masseter_runtime::messages::tap::TapError>(())
 /// ```
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Analysis {
     period_ns: u64,
     declared: Declared,
     interfaces: Vec<String>,
     /// The cycles in the order of time.
     timeline: Timeline,
-    named: NamedWatch,
     /// `None` if nothing is shown.
     shown: Option<Box<Shown>>,
     /// None but in a dry run.
@@ -83,7 +82,6 @@ pub struct Analysis {
     played: PlayedWatch,
     /// None where the scenario plays no recording.
     recorded: Option<RecordedWatch>,
-    contact: ContactWatch,
     /// None where the force is not estimated, or has no truth.
     bite_estimate: Option<BiteEstimateWatch>,
     /// `None` if the scenario requires nothing.
@@ -121,7 +119,6 @@ impl Analysis {
             declared: declared.clone(),
             interfaces: scenario.can.interfaces.clone(),
             timeline: Timeline::new(scenario, declared, pace),
-            named: NamedWatch::new(declared),
             shown: Some(Box::new(Shown::new(scenario, declared.signals.len()))),
             axes: scenario.dry.is_on.then(|| AxisWatch::new(scenario)),
             tracking: Tracking::new(
@@ -131,33 +128,23 @@ impl Analysis {
             limits: scenario.checks,
             faults: FaultWatch::new(scenario.faults.len()),
             fault_kinds: scenario.faults.iter().map(|fault| fault.kind).collect(),
-            stalls: ScenarioStalls::default(),
-            sequence: SequenceCheck::default(),
             responses: Responses::for_scenario(scenario),
-            freshness: Freshness::default(),
-            disturbance: Disturbance::default(),
-            digest: Digest::default(),
-            first_sample_ns: None,
-            last_sample_ns: 0,
-            last_due_ns: 0,
-            controller_skips: Skips::default(),
-            plant_skips: Skips::default(),
-            outage: OutageWatch::default(),
-            stop: StopWatch::default(),
             standstill: StandstillWatch::new(scenario),
             played: PlayedWatch::new(scenario),
             recorded: (declared.motion == PlayedMotion::Scenario)
                 .then(|| RecordedWatch::of_scenario(scenario))
                 .flatten(),
-            contact: ContactWatch::default(),
             bite_estimate: is_emulated.then(|| BiteEstimateWatch::new(declared)).flatten(),
             requirements: (!requirements.is_empty()).then_some(requirements),
             figures: Figures {
+                signals: declared.signals.iter().map(SignalFigures::new).collect(),
+                parameters: declared.parameters.iter().map(ParameterFigures::new).collect(),
                 frames: scenario.recording.frames.then(Vec::new),
                 // The robot has no sensor for this force.
                 bite_force_max_n: scenario.has_contact().then_some(0.0),
                 ..Figures::default()
             },
+            ..Self::default()
         }
     }
 
@@ -185,14 +172,16 @@ impl Analysis {
             Recorded::Truth(truth) => self.apply_truth(truth),
             Recorded::Contact(contact) => {
                 let since_ns = self.shown.as_mut().map(|shown| shown.over_time.since(contact.sampled_ns));
-                self.contact.add_contact(contact, since_ns);
+                self.figures.contact.get_or_insert_default().add_contact(contact, since_ns);
             }
             Recorded::Frame(frame) => self.apply_frame(frame)?,
             Recorded::Signals(message) => {
-                self.named.add_signals(message);
+                SignalFigures::add_all(&mut self.figures.signals, message);
                 self.shown.iter_mut().for_each(|shown| shown.over_time.apply_signals(message));
             }
-            Recorded::Parameters(message) => self.named.add_parameters(message),
+            Recorded::Parameters(message) => {
+                ParameterFigures::add_all(&mut self.figures.parameters, message);
+            }
             Recorded::Event(event) => {
                 self.apply_event(EventRecord::of_run(event, &self.declared, &self.interfaces));
             }
@@ -324,7 +313,7 @@ impl Analysis {
         let reference = &self.timeline.reference;
         let rest_m = reference.rest(|from, to| self.played.distance_m(from, to));
         let (rest_s, lag_causes_ms) = (reference.rest_s(), reference.lag_causes_ms());
-        let (disorder, disorder_ns) = reference.disorder();
+        let disorder = reference.disorder();
         let (tracking, track) = self.tracking.into_figures();
         let duration_ns =
             self.last_sample_ns.saturating_sub(self.first_sample_ns.unwrap_or(self.last_sample_ns));
@@ -347,7 +336,6 @@ impl Analysis {
             ended_ns,
             last_cycle_ns: self.last_due_ns.min(self.last_sample_ns),
             disorder,
-            disorder_ns,
             digest: self.digest.in_hex(),
             duration_s: duration_ns as f64 / 1e9,
             overrun_attribution: OverrunAttribution::new(&[&self.controller_skips, &self.plant_skips]),
@@ -365,9 +353,6 @@ impl Analysis {
             recorded: self.recorded.and_then(RecordedWatch::into_figures),
             faults: self.faults.into_figures(ended_ns),
             requirements: self.requirements.map(Requirements::into_figures).unwrap_or_default(),
-            signals: self.named.signals,
-            parameters: self.named.parameters,
-            contact: self.contact.into_figures(),
             bite_estimate: self.bite_estimate.and_then(BiteEstimateWatch::into_figures),
             topics,
             bus_response: self.responses.into_figures(missing_frames),

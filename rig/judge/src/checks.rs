@@ -197,8 +197,7 @@ fn sequence(manifest: &Manifest, figures: &Figures) -> Check {
         return Check::not_judged(NAME, format!("ended in state {in_words}{how}"));
     }
     if let Some(shortfall) = Shortfall::of(manifest, figures) {
-        let check = Check::new(NAME, shortfall.to_string(), shortfall.result());
-        return check.with_breach(shortfall.breach(figures));
+        return shortfall.check(NAME, figures);
     }
     let has_finished = is_in(ControllerState::Finished) && figures.stopped_by.is_none();
     let has_stopped = is_in(ControllerState::SafeStop) || figures.stopped_by.is_some();

@@ -39,7 +39,7 @@ pub struct Detection {
 }
 
 /// Follows the declared faults.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct FaultWatch {
     /// Each with the deviation in its last sample.
     faults: Vec<(FaultFigures, Deviation)>,

@@ -52,12 +52,9 @@ pub struct Figures {
     /// When the controller first stated a safe stop, or the readings first showed a stop of drives or master, ns of the run's clock.
     #[serde(skip)]
     pub stop_without_event_ns: Option<u64>,
-    /// What is out of order in the controller's states.
+    /// What is out of order in the controller's states, and when that was, ns of the run's clock; no time of a motion that never began.
     #[serde(skip)]
-    pub disorder: Option<Disorder>,
-    /// When that was, ns of the run's clock; none of a motion that never began.
-    #[serde(skip)]
-    pub disorder_ns: Option<u64>,
+    pub disorder: Option<(Disorder, Option<u64>)>,
     /// What stopped the drives, whatever the controller reports; `None` if nothing did.
     pub stopped_by: Option<StoppedBy>,
     /// For how long all drives were enabled, s.

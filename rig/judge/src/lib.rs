@@ -77,5 +77,5 @@ pub use standstill::StandstillFigures;
 pub use statistic::{Statistic, student_t};
 pub use timing::{Timing, TimingWord};
 pub use tracking::{PoseErrors, PoseSource, TrackingFigures, TrackingSample, UndisturbedFigures};
-pub use verdict::{Judgement, Verdict};
+pub use verdict::Verdict;
 pub use watch::{UnknownRequirement, Watch};

@@ -3,14 +3,14 @@
 
 use masseter_model::geometry::AXES;
 use masseter_runtime::messages::codes::ControllerState;
-use masseter_runtime::messages::{Command, Contact, Reading, ToothContact};
-use masseter_scenario::{MOST_PAIRS, Scenario};
+use masseter_runtime::messages::{Command, Contact, Reading};
+use masseter_scenario::Scenario;
 use serde::Serialize;
 
-use crate::series::{Band, ByCycle, Curve};
+use crate::series::{Band, ByCycle};
 
 /// What the teeth of the emulated jaw bore.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct ContactFigures {
     /// The greatest sum of the forces on all teeth, N.
     pub total_max_n: f64,
@@ -21,10 +21,12 @@ pub struct ContactFigures {
     /// What the teeth bore over time, as often as a screen shows it; of a long run not to its end.
     #[serde(skip)]
     pub moments: Vec<ToothLoads>,
+    #[serde(skip)]
+    frame_ends_s: f64,
 }
 
 /// What a tooth bore.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct ToothFigures {
     /// FDI number.
     pub number: u32,
@@ -34,9 +36,9 @@ pub struct ToothFigures {
     pub max_n: f64,
     /// The force on it when the sum of all was greatest, base axes, N.
     pub at_total_max_n: [f64; 3],
-    /// The greatest force in each stretch of time, with its own time since the run's first SYNC, s and N.
+    /// The force since the run's first SYNC, N.
     #[serde(skip)]
-    pub course_n: Curve,
+    pub force_n: Band,
 }
 
 /// What the teeth bore when their sum was greatest within the time of a frame on a screen.
@@ -55,38 +57,29 @@ const MOST_FRAMES: usize = 2048;
 /// Less is no force to be shown, N.
 const LEAST_N: f64 = 0.1;
 
-/// Collects them.
-#[derive(Debug, Clone, Default)]
-pub(super) struct ContactWatch {
-    moments: Vec<ToothLoads>,
-    frame_ends_s: f64,
-    total_max_n: f64,
-    greatest: Contact,
-    max_n: [f64; MOST_PAIRS],
-    courses: [Band; MOST_PAIRS],
-    /// The newest message, which names the teeth.
-    newest: Option<Contact>,
-}
-
-impl ContactWatch {
+impl ContactFigures {
     /// Takes a message, sampled so long after the run's first SYNC; `None` if no course is shown.
     pub(super) fn add_contact(&mut self, contact: &Contact, since_ns: Option<u64>) {
+        self.teeth.resize_with(contact.teeth().count(), ToothFigures::default);
         let mut total_n = 0.0;
-        for (place, tooth) in contact.teeth().enumerate() {
+        for (figures, tooth) in self.teeth.iter_mut().zip(contact.teeth()) {
             let load_n = tooth.load_n();
             total_n += load_n;
-            self.max_n[place] = self.max_n[place].max(load_n);
+            (figures.number, figures.place_m) = (tooth.number, tooth.place_m);
+            figures.max_n = figures.max_n.max(load_n);
             if let Some(since_ns) = since_ns {
-                self.courses[place].add(since_ns, load_n);
+                figures.force_n.add(since_ns, load_n);
             }
         }
         if let Some(since_ns) = since_ns {
             self.add_moment(since_ns as f64 / 1e9, total_n, contact);
         }
         if total_n > self.total_max_n {
-            (self.total_max_n, self.greatest) = (total_n, *contact);
+            (self.total_max_n, self.total_max_at_ns) = (total_n, contact.sampled_ns);
+            for (figures, tooth) in self.teeth.iter_mut().zip(contact.teeth()) {
+                figures.at_total_max_n = tooth.force_n;
+            }
         }
-        self.newest = Some(*contact);
     }
 
     fn add_moment(&mut self, at_s: f64, total_n: f64, contact: &Contact) {
@@ -105,24 +98,6 @@ impl ContactWatch {
         let loaded = contact.teeth().enumerate().filter(|(_, tooth)| tooth.load_n() >= LEAST_N);
         let forces_n = loaded.map(|(place, tooth)| (place, tooth.force_n)).collect();
         self.moments.push(ToothLoads { at_s, forces_n, total_n });
-    }
-
-    /// The figures; none without a message.
-    pub(super) fn into_figures(self) -> Option<ContactFigures> {
-        let greatest: Vec<_> = self.greatest.teeth().collect();
-        let tooth = |(place, tooth): (usize, ToothContact)| ToothFigures {
-            number: tooth.number,
-            place_m: tooth.place_m,
-            max_n: self.max_n[place],
-            at_total_max_n: greatest.get(place).map_or([0.0; 3], |tooth| tooth.force_n),
-            course_n: self.courses[place].highest(),
-        };
-        Some(ContactFigures {
-            total_max_n: self.total_max_n,
-            total_max_at_ns: self.greatest.sampled_ns,
-            teeth: self.newest?.teeth().enumerate().map(tooth).collect(),
-            moments: self.moments,
-        })
     }
 }
 

@@ -9,7 +9,7 @@ use crc32fast::Hasher;
 use masseter_recording::{Recorded, Topic};
 use masseter_runtime::messages::codes::Source;
 use masseter_runtime::messages::{Event, Parameters, Signals};
-use masseter_runtime::named::{Declared, Parameter, Signal};
+use masseter_runtime::named::{Parameter, Signal};
 use serde::Serialize;
 
 /// Digests each topic by itself, since the recorder drains topic after topic.
@@ -150,45 +150,18 @@ pub struct ParameterFigures {
     pub changes: u64,
 }
 
-/// Collects both.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct NamedWatch {
-    pub(crate) signals: Vec<SignalFigures>,
-    pub(crate) parameters: Vec<ParameterFigures>,
-}
-
-impl NamedWatch {
-    pub(crate) fn new(declared: &Declared) -> Self {
-        let signal = |signal: &Signal| {
-            let (signal, [min, mean, max, last]) = (signal.clone(), [None; 4]);
-            SignalFigures { signal, values: 0, not_finite: 0, min, mean, max, last }
-        };
-        let parameter = |parameter: &Parameter| ParameterFigures {
-            parameter: parameter.clone(),
-            last: parameter.value,
-            changes: 0,
-        };
-        Self {
-            signals: declared.signals.iter().map(signal).collect(),
-            parameters: declared.parameters.iter().map(parameter).collect(),
-        }
-    }
-
-    pub(crate) fn add_signals(&mut self, message: &Signals) {
-        for (figures, value) in self.signals.iter_mut().zip(message.signals.as_slice()) {
-            figures.add_value(*value);
-        }
-    }
-
-    pub(crate) fn add_parameters(&mut self, message: &Parameters) {
-        for (figures, &value) in self.parameters.iter_mut().zip(message.parameters.as_slice()) {
-            figures.changes += u64::from(value.to_bits() != figures.last.to_bits());
-            figures.last = value;
-        }
-    }
-}
-
 impl SignalFigures {
+    /// Without a value yet.
+    pub(crate) fn new(signal: &Signal) -> Self {
+        let (signal, [min, mean, max, last]) = (signal.clone(), [None; 4]);
+        Self { signal, values: 0, not_finite: 0, min, mean, max, last }
+    }
+
+    /// Takes the values of all signals.
+    pub(crate) fn add_all(all: &mut [Self], message: &Signals) {
+        all.iter_mut().zip(message.signals.as_slice()).for_each(|(figures, value)| figures.add_value(*value));
+    }
+
     fn add_value(&mut self, value: f64) {
         if !value.is_finite() {
             self.not_finite += 1;
@@ -200,6 +173,21 @@ impl SignalFigures {
         self.min = Some(self.min.map_or(value, |min| min.min(value)));
         self.max = Some(self.max.map_or(value, |max| max.max(value)));
         self.last = Some(value);
+    }
+}
+
+impl ParameterFigures {
+    /// With its value at the start.
+    pub(crate) fn new(parameter: &Parameter) -> Self {
+        Self { parameter: parameter.clone(), last: parameter.value, changes: 0 }
+    }
+
+    /// Takes the values of all parameters.
+    pub(crate) fn add_all(all: &mut [Self], message: &Parameters) {
+        for (figures, &value) in all.iter_mut().zip(message.parameters.as_slice()) {
+            figures.changes += u64::from(value.to_bits() != figures.last.to_bits());
+            figures.last = value;
+        }
     }
 }
 

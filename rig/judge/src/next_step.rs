@@ -1,5 +1,6 @@
 //! What to do next about a run that did not pass: one sentence for each kind of verdict.
 
+use masseter_can::codes;
 use masseter_recording::{Ending, Manifest};
 use masseter_runtime::messages::codes::Cause;
 use masseter_scenario::ExpectedVerdict::{Died, Fail, Incomplete, Interrupted, Pass, SafeStop, Untested};
@@ -9,110 +10,90 @@ use crate::check::{Check, Subject};
 use crate::outcome::{Outcome, clock_jump};
 use crate::{breach::Breach, checks::lag_cause, events::Code, figures::Figures};
 
-/// Declares the steps, each with its sentence.
-macro_rules! next_steps {
-    ($($(#[$meta:meta])* $step:ident => $sentence:literal,)*) => {
-        /// What to do next.
-        #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-        pub enum NextStep {
-            $($(#[$meta])* $step,)*
-        }
-
-        impl NextStep {
-            /// Every step.
-            pub const ALL: &[Self] = &[$(Self::$step),*];
-
-            /// The sentence, with `RUN` for the folder of the run and `CLOCK` for its clock.
-            pub const fn sentence(self) -> &'static str {
-                match self {
-                    $(Self::$step => $sentence,)*
-                }
-            }
-        }
-    };
-}
-
-next_steps! {
-    /// FAIL of another outcome than the expected one.
-    Expectation => "If this outcome is right, change `expect.verdict` in the scenario (docs/requirements.md); otherwise correct the controller.",
-    /// FAIL by a requirement.
-    Requirement => "Look at that time in `RUN/report.html`, then correct the controller, or the limit in `[[require]]` (docs/requirements.md).",
-    /// FAIL by tracking.
-    Tracking => "Compare desired and true motion in `RUN/report.html`, then tune the controller (docs/tutorials/bring-up.md), or change `checks.tracking_max_mm`.",
-    /// FAIL by a late motion or missing commands.
-    Late => "Look for late readings and lost frames in `RUN/report.html`; `checks.motion_lag_ms` and `controller.stale_cycles` are the limits.",
-    /// FAIL by a motion whose time the controller changed.
-    MotionTime => "Begin the motion at the end of the lead-in, and let its time advance by one period a cycle (docs/interface.md).",
-    /// FAIL by a desired pose that is no pose.
-    StatedPose => "Publish a finite desired pose in each cycle of the motion; `RUN/report.html` shows where it is missing (docs/interface.md).",
-    /// FAIL by missed deadlines.
-    Timing => "Shorten the longest cycles that `RUN/report.html` lists, or lower `rate_hz` (docs/realtime.md).",
-    /// FAIL by a jaw that moved after its stop.
-    Standstill => "Find in `RUN/report.html` which axis moved after the stop, then check its brake; `checks.standstill_axis_mm` is the limit.",
-    /// FAIL by a declared fault that nothing detected in time.
-    Undetected => "Look up in docs/faults.md what detects this fault, then tighten that limit, such as `can.following_limit_m`.",
-    /// FAIL by the end of the sequence.
-    Sequence => "Find in the events of `RUN/report.html` what ended the motion, then correct it, or expect it (docs/requirements.md).",
-    /// FAIL by a controller that waits for ever.
-    Overdue => "Let the controller begin the motion once the drives are enabled, and finish after the motion (docs/interface.md), or raise `controller.overdue_s`.",
-    /// FAIL by missing messages.
-    Dropped => "Run `masseter recording info RUN` to see what is missing, then repeat the run with less beside it, or with `recording.frames` = false.",
-    /// FAIL by a late frame on a bus.
-    Bus => "Find the late message in `RUN/report.html` under buses, then look for other senders on that bus (docs/can.md).",
-    /// SAFE STOP by a fault of the scenario.
-    DeclaredFault => "A fault of the scenario caused this stop; if the stop is right, set `expect.verdict` to safe_stop (docs/requirements.md).",
-    /// SAFE STOP by a drive.
-    Drive => "Remove the cause of the drive's error, which the events in `RUN/report.html` name (docs/robot.md), then run again.",
-    /// SAFE STOP by lost messages or nodes.
-    Lost => "Check wiring, power and bit rate of the named node; `RUN/report.html` shows axis and buses around the stop (docs/can.md).",
-    /// SAFE STOP by a configuration of a drive that is not as expected.
-    Configuration => "Run `masseter robot inspect RUN/scenario.toml` to see every object that differs, then correct the drive or its profile (docs/robot.md).",
-    /// SAFE STOP by a limit of an axis.
-    Limit => "Keep the motion within the axis' limits: smaller, slower or elsewhere; `RUN/report.html` shows the axis around the stop (docs/motions.md).",
-    /// SAFE STOP by the distance from the path.
-    OffPath => "Compare true and reported position around the stop in `RUN/report.html`, then tune the controller (docs/tutorials/bring-up.md), or check the axis.",
-    /// SAFE STOP by missing readings or commands.
-    Stale => "Find what delayed controller or plant: `masseter doctor`, then the longest cycles in `RUN/report.html` (docs/interface.md).",
-    /// SAFE STOP by the controller's law or its messages.
-    Law => "Repeat the decisions with `masseter replay RUN`, then correct the controller at the cycle of the event (docs/interface.md).",
-    /// SAFE STOP by the law or the messages of a program.
-    ProgramLaw => "Read the messages of the program in the terminal, then correct its command at the cycle of the event (docs/interface.md).",
-    /// SAFE STOP by a pose that the mechanism cannot have.
-    Pose => "Compare the scenario's `mechanism` with the rig, and the motion with its reach (docs/forward-kinematics.md, docs/motions.md).",
-    /// SAFE STOP by a start too far away.
-    Start => "Bring the jaw closer to the first pose of the motion, or raise `controller.start_tolerance_mm` (docs/robot.md).",
-    /// SAFE STOP by a bite force above the limit.
-    TooHard => "Close more slowly, or state the stiffness of food and teeth in `force_control`; `overload` is the limit (docs/dynamics-control.md).",
-    /// SAFE STOP without a cause of these.
-    Stop => "Read the events in `RUN/report.html` from the first fault on; docs/troubleshooting.md lists causes and remedies.",
-    /// DIED: the controller.
-    ControllerDied => "Read the controller's own messages in the terminal, then repeat its readings under a debugger (docs/interface.md): `masseter replay RUN`.",
-    /// DIED: a program.
-    ProgramDied => "Read the messages of the program in the terminal, then start it under a debugger: `masseter run --controller external` waits for it.",
-    /// DIED: a process that a fault of the scenario killed.
-    DeclaredDeath => "A fault of the scenario killed the process; if the death is right, set `expect.verdict` to died (docs/requirements.md).",
-    /// DIED: another process.
-    ProcessDied => "Run `masseter doctor` to see what the machine lacks, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
-    /// INVALID by lost cycles.
-    LostCycles => "Run `masseter doctor` and remove what it lists, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
-    /// INVALID by lost cycles, where the doctor knows the best remedy.
-    Mend => "Run `MEND`, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
-    /// INVALID without real time.
-    NoRealTime => "Run `masseter doctor`, which names the missing permission and the command that gives it, then repeat the run.",
-    /// INVALID by a clock that was set.
-    ClockSet => "Let nothing set the clock, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
-    /// INCOMPLETE.
-    Unwritten => "Free the disk, save what was written with `masseter recording recover RUN`, then repeat the run.",
-    /// INTERRUPTED by the user.
-    Repeat => "To judge the whole motion, repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
-    /// INTERRUPTED by a stimulus of the scenario.
-    DeclaredStop => "The scenario asks for this stop; if the stop is right, set `expect.verdict` to interrupted (docs/requirements.md).",
-    /// UNTESTED: a fault or stimulus did not act.
-    NeverActed => "Let the fault or stimulus act while the motion runs: change its time in `RUN/scenario.toml`, then run that file as before.",
-    /// UNTESTED: a requirement.
-    NotJudged => "Choose a window, trigger or signal that this motion has, or let a fault bring it, in `RUN/scenario.toml`, then run that file as before (docs/requirements.md).",
-    /// UNTESTED: anything else.
-    TooLittle => "Change what the reason names in `RUN/scenario.toml`, such as `duration_s` where it asks for more of the motion, then run that file as before.",
+codes! {
+    /// What to do next; its name is the sentence, with `RUN` for the folder of the run and `CLOCK` for its clock.
+    NextStep as u8 {
+        /// FAIL of another outcome than the expected one.
+        Expectation = 0 "If this outcome is right, change `expect.verdict` in the scenario (docs/requirements.md); otherwise correct the controller.",
+        /// FAIL by a requirement.
+        Requirement = 1 "Look at that time in `RUN/report.html`, then correct the controller, or the limit in `[[require]]` (docs/requirements.md).",
+        /// FAIL by tracking.
+        Tracking = 2 "Compare desired and true motion in `RUN/report.html`, then tune the controller (docs/tutorials/bring-up.md), or change `checks.tracking_max_mm`.",
+        /// FAIL by a late motion or missing commands.
+        Late = 3 "Look for late readings and lost frames in `RUN/report.html`; `checks.motion_lag_ms` and `controller.stale_cycles` are the limits.",
+        /// FAIL by a motion whose time the controller changed.
+        MotionTime = 4 "Begin the motion at the end of the lead-in, and let its time advance by one period a cycle (docs/interface.md).",
+        /// FAIL by a desired pose that is no pose.
+        StatedPose = 5 "Publish a finite desired pose in each cycle of the motion; `RUN/report.html` shows where it is missing (docs/interface.md).",
+        /// FAIL by missed deadlines.
+        Timing = 6 "Shorten the longest cycles that `RUN/report.html` lists, or lower `rate_hz` (docs/realtime.md).",
+        /// FAIL by a jaw that moved after its stop.
+        Standstill = 7 "Find in `RUN/report.html` which axis moved after the stop, then check its brake; `checks.standstill_axis_mm` is the limit.",
+        /// FAIL by a declared fault that nothing detected in time.
+        Undetected = 8 "Look up in docs/faults.md what detects this fault, then tighten that limit, such as `can.following_limit_m`.",
+        /// FAIL by the end of the sequence.
+        Sequence = 9 "Find in the events of `RUN/report.html` what ended the motion, then correct it, or expect it (docs/requirements.md).",
+        /// FAIL by a controller that waits for ever.
+        Overdue = 10 "Let the controller begin the motion once the drives are enabled, and finish after the motion (docs/interface.md), or raise `controller.overdue_s`.",
+        /// FAIL by missing messages.
+        Dropped = 11 "Run `masseter recording info RUN` to see what is missing, then repeat the run with less beside it, or with `recording.frames` = false.",
+        /// FAIL by a late frame on a bus.
+        Bus = 12 "Find the late message in `RUN/report.html` under buses, then look for other senders on that bus (docs/can.md).",
+        /// SAFE STOP by a fault of the scenario.
+        DeclaredFault = 13 "A fault of the scenario caused this stop; if the stop is right, set `expect.verdict` to safe_stop (docs/requirements.md).",
+        /// SAFE STOP by a drive.
+        Drive = 14 "Remove the cause of the drive's error, which the events in `RUN/report.html` name (docs/robot.md), then run again.",
+        /// SAFE STOP by lost messages or nodes.
+        Lost = 15 "Check wiring, power and bit rate of the named node; `RUN/report.html` shows axis and buses around the stop (docs/can.md).",
+        /// SAFE STOP by a configuration of a drive that is not as expected.
+        Configuration = 16 "Run `masseter robot inspect RUN/scenario.toml` to see every object that differs, then correct the drive or its profile (docs/robot.md).",
+        /// SAFE STOP by a limit of an axis.
+        Limit = 17 "Keep the motion within the axis' limits: smaller, slower or elsewhere; `RUN/report.html` shows the axis around the stop (docs/motions.md).",
+        /// SAFE STOP by the distance from the path.
+        OffPath = 18 "Compare true and reported position around the stop in `RUN/report.html`, then tune the controller (docs/tutorials/bring-up.md), or check the axis.",
+        /// SAFE STOP by missing readings or commands.
+        Stale = 19 "Find what delayed controller or plant: `masseter doctor`, then the longest cycles in `RUN/report.html` (docs/interface.md).",
+        /// SAFE STOP by the controller's law or its messages.
+        Law = 20 "Repeat the decisions with `masseter replay RUN`, then correct the controller at the cycle of the event (docs/interface.md).",
+        /// SAFE STOP by the law or the messages of a program.
+        ProgramLaw = 21 "Read the messages of the program in the terminal, then correct its command at the cycle of the event (docs/interface.md).",
+        /// SAFE STOP by a pose that the mechanism cannot have.
+        Pose = 22 "Compare the scenario's `mechanism` with the rig, and the motion with its reach (docs/forward-kinematics.md, docs/motions.md).",
+        /// SAFE STOP by a start too far away.
+        Start = 23 "Bring the jaw closer to the first pose of the motion, or raise `controller.start_tolerance_mm` (docs/robot.md).",
+        /// SAFE STOP by a bite force above the limit.
+        TooHard = 24 "Close more slowly, or state the stiffness of food and teeth in `force_control`; `overload` is the limit (docs/dynamics-control.md).",
+        /// SAFE STOP without a cause of these.
+        Stop = 25 "Read the events in `RUN/report.html` from the first fault on; docs/troubleshooting.md lists causes and remedies.",
+        /// DIED: the controller.
+        ControllerDied = 26 "Read the controller's own messages in the terminal, then repeat its readings under a debugger (docs/interface.md): `masseter replay RUN`.",
+        /// DIED: a program.
+        ProgramDied = 27 "Read the messages of the program in the terminal, then start it under a debugger: `masseter run --controller external` waits for it.",
+        /// DIED: a process that a fault of the scenario killed.
+        DeclaredDeath = 28 "A fault of the scenario killed the process; if the death is right, set `expect.verdict` to died (docs/requirements.md).",
+        /// DIED: another process.
+        ProcessDied = 29 "Run `masseter doctor` to see what the machine lacks, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
+        /// INVALID by lost cycles.
+        LostCycles = 30 "Run `masseter doctor` and remove what it lists, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
+        /// INVALID by lost cycles, where the doctor knows the best remedy.
+        Mend = 31 "Run `MEND`, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
+        /// INVALID without real time.
+        NoRealTime = 32 "Run `masseter doctor`, which names the missing permission and the command that gives it, then repeat the run.",
+        /// INVALID by a clock that was set.
+        ClockSet = 33 "Let nothing set the clock, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
+        /// INCOMPLETE.
+        Unwritten = 34 "Free the disk, save what was written with `masseter recording recover RUN`, then repeat the run.",
+        /// INTERRUPTED by the user.
+        Repeat = 35 "To judge the whole motion, repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
+        /// INTERRUPTED by a stimulus of the scenario.
+        DeclaredStop = 36 "The scenario asks for this stop; if the stop is right, set `expect.verdict` to interrupted (docs/requirements.md).",
+        /// UNTESTED: a fault or stimulus did not act.
+        NeverActed = 37 "Let the fault or stimulus act while the motion runs: change its time in `RUN/scenario.toml`, then run that file as before.",
+        /// UNTESTED: a requirement.
+        NotJudged = 38 "Choose a window, trigger or signal that this motion has, or let a fault bring it, in `RUN/scenario.toml`, then run that file as before (docs/requirements.md).",
+        /// UNTESTED: anything else.
+        TooLittle = 39 "Change what the reason names in `RUN/scenario.toml`, such as `duration_s` where it asks for more of the motion, then run that file as before.",
+    }
 }
 
 impl NextStep {
@@ -240,7 +221,7 @@ mod tests {
     #[test]
     fn every_step_is_one_sentence_of_at_most_25_words() {
         for step in NextStep::ALL {
-            let sentence = step.sentence();
+            let sentence = step.name();
             assert!(sentence.split_whitespace().count() <= 25, "{step:?}: {sentence}");
             assert!(sentence.ends_with('.') && !sentence.contains(". "), "{step:?}: {sentence}");
         }

@@ -55,8 +55,7 @@ pub(crate) struct StateOrder {
     state: Option<ControllerState>,
     has_run: bool,
     /// The first, and when it was, ns of the run's clock.
-    disorder: Option<Disorder>,
-    disorder_ns: Option<u64>,
+    disorder: Option<(Disorder, Option<u64>)>,
 }
 
 impl StateOrder {
@@ -81,9 +80,7 @@ impl StateOrder {
         let is_back = to.code() < from.code() && !is_early(from) && !is_pause;
         let found = is_back.then_some(Disorder::Back { from, to });
         let found = if is_before_drives { Some(Disorder::BeforeDrives) } else { found };
-        if self.disorder.is_none() && found.is_some() {
-            (self.disorder, self.disorder_ns) = (found, reading.map(|of| of.sampled_ns));
-        }
+        self.disorder = self.disorder.or(found.map(|found| (found, reading.map(|of| of.sampled_ns))));
     }
 
     /// Whether the controller is in a state before the motion.
@@ -97,7 +94,7 @@ impl StateOrder {
     }
 
     /// What is out of order first, and when.
-    pub(crate) fn disorder(&self) -> (Option<Disorder>, Option<u64>) {
-        (self.disorder.or((!self.has_run).then_some(Disorder::NeverBegan)), self.disorder_ns)
+    pub(crate) fn disorder(&self) -> Option<(Disorder, Option<u64>)> {
+        self.disorder.or((!self.has_run).then_some((Disorder::NeverBegan, None)))
     }
 }

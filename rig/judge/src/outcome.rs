@@ -41,10 +41,6 @@ impl Outcome {
         self.word_and_exit().0
     }
 
-    pub(crate) fn exit(self) -> Exit {
-        self.word_and_exit().1
-    }
-
     /// The word in reports, and the exit code of the program. A test that tested nothing is as red as one that failed.
     pub(crate) fn word_and_exit(self) -> (&'static str, Exit) {
         match self.named() {

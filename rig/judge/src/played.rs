@@ -60,18 +60,15 @@ pub(super) struct PlayedWatch {
     progress_s: f64,
     way_m: f64,
     gone_m: f64,
-    lag_s: Option<f64>,
-    late_ns: Option<u64>,
     /// The limit of lag and lead.
     most_s: f64,
     ahead: AheadWatch,
     /// The cycle of the last reading.
     cycle: u64,
     answered: u64,
-    late_commands: u64,
-    missed_commands: u64,
+    /// Cycles in a row without a new command.
     in_a_row: u64,
-    most_in_a_row: u64,
+    figures: MotionFigures,
     /// Cycles in which the controller ran its motion with all drives enabled.
     running_cycles: u64,
 }
@@ -94,9 +91,10 @@ impl PlayedWatch {
         progress_s: f64,
         &PathSample { sampled_ns, desired, actual, .. }: &PathSample,
     ) {
-        self.lag_s = Some(self.lag_s.map_or(lag_s, |most_s| most_s.max(lag_s)));
+        let most_ms = self.figures.lag_ms.get_or_insert(lag_s * 1e3);
+        *most_ms = most_ms.max(lag_s * 1e3);
         if lag_s > self.most_s {
-            self.late_ns.get_or_insert(sampled_ns);
+            self.figures.late_ns.get_or_insert(sampled_ns);
         }
         let Some(now) = desired.zip(actual).map(|(desired, actual)| [desired, actual]) else { return };
         self.ahead.add_sample(lag_s, progress_s, now.each_ref(), |from, to| step(&self.points_m, from, to));
@@ -122,10 +120,10 @@ impl PlayedWatch {
             self.running_cycles += reading.cycle.saturating_sub(before);
         }
         let is_moving = is_moving(state) && !is_excused;
-        self.late_commands += u64::from(is_moving && is_new && reading.answers_cycle < before);
+        self.figures.late_commands += u64::from(is_moving && is_new && reading.answers_cycle < before);
         self.in_a_row = if is_new || !is_moving { 0 } else { self.in_a_row + 1 };
-        self.missed_commands += u64::from(self.in_a_row > 0);
-        self.most_in_a_row = self.most_in_a_row.max(self.in_a_row);
+        self.figures.missed_commands += u64::from(self.in_a_row > 0);
+        self.figures.missed_in_a_row = self.figures.missed_in_a_row.max(self.in_a_row);
     }
 
     /// In how many cycles the controller ran its motion with all drives enabled.
@@ -144,13 +142,8 @@ impl PlayedWatch {
         MotionFigures {
             way_mm: way_m.map(|way_m| way_m * 1e3),
             played: way_m.filter(|way_m| *way_m > NO_WAY_M).map(|way_m| self.gone_m / way_m),
-            lag_ms: self.lag_s.map(|lag_s| lag_s * 1e3),
-            late_ns: self.late_ns,
             ahead_ms: Some(self.ahead.in_s()).filter(|s| *s > self.most_s).map(|s| s * 1e3),
-            missed_commands: self.missed_commands,
-            missed_in_a_row: self.most_in_a_row,
-            late_commands: self.late_commands,
-            ..MotionFigures::default()
+            ..self.figures
         }
     }
 }

@@ -201,7 +201,7 @@ impl Reference {
     }
 
     /// What is out of order in the controller's states, and when it was.
-    pub(crate) fn disorder(&self) -> (Option<Disorder>, Option<u64>) {
+    pub(crate) fn disorder(&self) -> Option<(Disorder, Option<u64>)> {
         self.order.disorder()
     }
 

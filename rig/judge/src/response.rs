@@ -75,7 +75,7 @@ const FAULTS: &str = "the scenario's faults are in no plan";
 const NOT_RECORDED: &str = "the CAN frames are not recorded (recording.frames = false)";
 
 /// Follows every frame.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Responses {
     buses: Vec<Followed>,
     /// Why no run of the scenario has bounds.

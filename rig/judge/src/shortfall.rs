@@ -8,7 +8,9 @@ use masseter_runtime::messages::codes::{Cause, ControllerState};
 use masseter_runtime::{control::Deadline, named::PlayedMotion};
 use masseter_scenario::ExpectedVerdict;
 
-use crate::{breach::Breach, check::CheckResult, figures::Figures, order::Disorder, played::StoppedBy};
+use crate::{
+    breach::Breach, check::Check, check::CheckResult, figures::Figures, order::Disorder, played::StoppedBy,
+};
 
 /// Share of the motion that the jaw must go.
 const WHOLE: f64 = 0.95;
@@ -49,14 +51,14 @@ impl Shortfall {
             None if is_in(ControllerState::SafeStop) => return Self::of_stated_stop(manifest, figures),
             None => {}
         }
-        let is_never = |disorder: &Disorder| *disorder == Disorder::NeverBegan;
+        let is_never = |found: &(Disorder, _)| found.0 == Disorder::NeverBegan;
         // A stop by request, or the end of a process, may come before the motion.
         let may_be_short = figures.was_stopped_by_request() || manifest.ending != Ending::Completed;
         let disorder = figures.disorder.filter(|disorder| !(is_never(disorder) && may_be_short));
         if !is_in(ControllerState::Finished) {
-            return disorder.filter(is_never).map(Self::OutOfOrder);
+            return disorder.filter(is_never).map(|(disorder, _)| Self::OutOfOrder(disorder));
         }
-        if let Some(disorder) = disorder {
+        if let Some((disorder, _)) = disorder {
             return Some(Self::OutOfOrder(disorder));
         }
         if manifest.declared.motion == PlayedMotion::Own {
@@ -115,7 +117,7 @@ impl Shortfall {
     }
 
     /// What is beyond its limit; none where nothing shows.
-    pub(crate) fn breach(self, figures: &Figures) -> Option<Breach> {
+    fn breach(self, figures: &Figures) -> Option<Breach> {
         let motion_ns = figures.path_breach.motion_ns;
         let percent = |share: f64| format!("{:.0} %", (share * 100.0).round() + 0.0);
         let seconds = |s: f64| format!("{s:.2} s");
@@ -133,19 +135,18 @@ impl Shortfall {
             Self::NotEnded { limit_s } => {
                 Some(Breach::new("state finished", "never", format!("within {}", seconds(limit_s))))
             }
-            Self::OutOfOrder(disorder) => Some(out_of_order(disorder).at(figures.disorder_ns)),
+            Self::OutOfOrder(disorder) => {
+                Some(out_of_order(disorder).at(figures.disorder.and_then(|(_, at_ns)| at_ns)))
+            }
             Self::Still | Self::Unjudged | Self::OnlyStated => None,
         }
     }
 
-    pub(crate) fn result(self) -> CheckResult {
-        match self {
-            Self::Still | Self::Unjudged | Self::OnlyStated => CheckResult::Untested,
-            Self::NotPlayed { .. }
-            | Self::NotBegun { .. }
-            | Self::NotEnded { .. }
-            | Self::Early { .. }
-            | Self::OutOfOrder(_) => CheckResult::Failed,
+    /// The check of that name, which fails, or is untested where nothing is beyond a limit.
+    pub(crate) fn check(self, name: &'static str, figures: &Figures) -> Check {
+        match self.breach(figures) {
+            Some(breach) => Check::judged(name, self.to_string(), false).with_breach(breach),
+            None => Check::untested(name, self.to_string()),
         }
     }
 }

@@ -112,7 +112,6 @@ pub(super) struct PathSample {
 /// Compares desired, estimated and, where there are any, true poses of the same sample.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Tracking {
-    source: PoseSource,
     /// The incisal point in the platform frame.
     incisal_m: [f64; 3],
     was_moving: bool,
@@ -121,8 +120,7 @@ pub(super) struct Tracking {
     errors: Errors,
     undisturbed: Errors,
     estimates: Sums,
-    without_pose: u64,
-    without_pose_ns: Option<u64>,
+    figures: TrackingFigures,
     track: Vec<TrackingSample>,
     next_sample_ns: u64,
     /// How often the time between two samples of the track has doubled.
@@ -134,7 +132,8 @@ pub(super) struct Tracking {
 
 impl Tracking {
     pub(super) fn new(source: PoseSource, incisal_m: [f64; 3]) -> Self {
-        Self { source, incisal_m, ..Self::default() }
+        let figures = TrackingFigures { actual_source: source, ..TrackingFigures::default() };
+        Self { incisal_m, figures, ..Self::default() }
     }
 
     /// The drives are stopped at the sample of this cycle of the plant.
@@ -158,7 +157,7 @@ impl Tracking {
         let (desired, is_disturbed, is_used) =
             (messages.desired, messages.is_disturbed, messages.solution.is_some());
         let estimated = messages.solution.as_ref().and_then(estimated_pose);
-        let actual = match self.source {
+        let actual = match self.figures.actual_source {
             PoseSource::Truth => true_pose(messages.truth.as_ref()?),
             PoseSource::Estimate if is_used => estimated,
             PoseSource::Estimate => return None,
@@ -178,8 +177,8 @@ impl Tracking {
                 .as_ref()
                 .filter(|state| crate::poses::is_moving(Some(state.controller_state)));
             if solution.is_some_and(|state| desired_pose(state).is_none()) {
-                self.without_pose += 1;
-                self.without_pose_ns.get_or_insert(sampled_ns);
+                self.figures.without_pose += 1;
+                self.figures.without_pose_ns.get_or_insert(sampled_ns);
             }
             let estimate = deviation(desired.as_ref(), estimated.as_ref(), self.incisal_m);
             self.errors(is_disturbed).for_each(|errors| errors.estimated.each(&estimate, take));
@@ -229,17 +228,15 @@ impl Tracking {
 
     pub(super) fn into_figures(self) -> (TrackingFigures, Vec<TrackingSample>) {
         let UndisturbedFigures { samples, actual, estimated } = self.errors.figures();
-        let has_truth = self.source == PoseSource::Truth;
+        let has_truth = self.figures.actual_source.is_truth();
         let figures = TrackingFigures {
-            actual_source: self.source,
             samples,
-            without_pose: self.without_pose,
-            without_pose_ns: self.without_pose_ns,
             actual,
             rms_noise_mm: standard_error(&self.seconds),
             estimated,
             estimate_rms_mm: (self.estimates.samples > 0 && has_truth).then(|| self.estimates.rms() * 1e3),
             undisturbed: self.undisturbed.figures(),
+            ..self.figures
         };
         (figures, self.track)
     }

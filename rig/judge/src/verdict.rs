@@ -52,6 +52,9 @@ pub struct Verdict {
     /// What the plan of the run warns of. Warnings decide nothing.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub warnings: Vec<String>,
+    /// The digest of the run: equal where the rig did the same.
+    #[serde(skip)]
+    pub digest: String,
     #[serde(skip)]
     pub(crate) outcome: Outcome,
 }
@@ -102,15 +105,17 @@ impl Verdict {
         }
         let first_breach = (outcome.word() == "FAIL").then(|| first_breach(&all, expect, figures)).flatten();
         let next_step = NextStep::of(outcome, manifest, figures, &all, first_breach.as_ref());
+        let (word, exit_code) = outcome.word_and_exit();
         Self {
-            word: outcome.word(),
+            word,
             first_breach,
             next_step: next_step.map(|step| in_words(step, manifest)),
             reason,
-            exit_code: outcome.exit(),
+            exit_code,
             timing,
             checks: all,
             warnings: manifest.warnings.clone(),
+            digest: figures.digest.clone(),
             outcome,
         }
     }
@@ -271,7 +276,7 @@ fn in_words(step: NextStep, manifest: &Manifest) -> String {
     let mending = manifest.mending_command.as_deref().unwrap_or_default();
     let controller = manifest.controller.as_ref().map(|name| format!(" --controller '{name}'"));
     let again = manifest.clock.clone() + &controller.unwrap_or_default();
-    step.sentence().replace("MEND", mending).replace("CLOCK", &again)
+    step.name().replace("MEND", mending).replace("CLOCK", &again)
 }
 
 /// The earliest breach, but of the failures that the scenario expects.
@@ -286,22 +291,6 @@ fn named(checks: &[Check], result: CheckResult) -> Option<String> {
     let names: Vec<_> =
         checks.iter().filter(|check| check.result == result).map(|check| check.name.as_ref()).collect();
     (!names.is_empty()).then(|| names.join(", "))
-}
-
-/// The verdict on a run, and the digest of what the rig did.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Judgement {
-    /// The verdict.
-    pub verdict: Verdict,
-    /// The digest: equal for runs in which the rig did the same.
-    pub digest: String,
-}
-
-impl Judgement {
-    /// Judges a run.
-    pub fn new(manifest: &Manifest, figures: &Figures) -> Self {
-        Self { verdict: Verdict::new(manifest, figures), digest: figures.digest.clone() }
-    }
 }
 
 #[cfg(test)]

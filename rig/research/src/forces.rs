@@ -69,7 +69,8 @@ pub(crate) fn play() -> anyhow::Result<[(&'static str, String); 5]> {
         (tooth.number, place_mm.map(number), [load_n, tooth.max_n].map(number), pressure(cusp, load_n))
     };
     let course = |tooth: &ToothFigures| {
-        let points = tooth.course_n.iter();
+        let course_n = tooth.force_n.highest();
+        let points = course_n.iter();
         let rows: Vec<_> = points
             .map(|&(at_s, load_n)| ("pressed teeth", tooth.number, number(at_s), pressure(cusp, load_n)))
             .collect();
@@ -85,7 +86,7 @@ pub(crate) fn play() -> anyhow::Result<[(&'static str, String); 5]> {
             };
             let row =
                 |&(at_s, load_n): &(f64, f64)| (*name, tooth.number, number(at_s), pressure(food, load_n));
-            courses.extend(loads.course_n.iter().map(row));
+            courses.extend(loads.force_n.highest().iter().map(row));
         }
     }
     Ok([

@@ -12,22 +12,20 @@ mod contact {
 
     #[test]
     fn the_greatest_of_each_tooth_and_the_greatest_sum_are_kept_with_their_moment() {
-        let mut watch = ContactWatch::default();
+        let mut figures = ContactFigures::default();
         for (tenth, forces_n) in [(1, [5.0, 0.0]), (2, [30.0, 20.0]), (3, [40.0, 1.0])] {
             let at_ns = tenth * 100_000;
-            watch.add_contact(&contact(at_ns, forces_n), Some(at_ns));
+            figures.add_contact(&contact(at_ns, forces_n), Some(at_ns));
         }
-        let figures = watch.into_figures().unwrap();
         assert_eq!((figures.total_max_n, figures.total_max_at_ns), (50.0, 200_000));
         let found: Vec<_> =
             figures.teeth.iter().map(|tooth| (tooth.number, tooth.max_n, tooth.at_total_max_n[2])).collect();
         assert_eq!(found, [(36, 40.0, -30.0), (46, 20.0, -20.0)]);
-        assert_eq!(figures.teeth[0].course_n, [(0.0003, 40.0)]);
+        assert_eq!(figures.teeth[0].force_n.highest(), [(0.0003, 40.0)]);
         // The three messages share a frame of a screen.
         let moments: Vec<_> =
             figures.moments.iter().map(|moment| (moment.at_s, moment.forces_n.len())).collect();
         assert_eq!(moments, [(0.0002, 2)]);
-        assert_eq!(ContactWatch::default().into_figures(), None);
     }
 }
 

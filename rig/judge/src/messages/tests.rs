@@ -74,17 +74,17 @@ mod named {
 
     #[test]
     fn signals_have_extremes_and_mean_and_changes_of_parameters_are_counted() {
-        let signals = vec![Signal { name: "a".into(), unit: "mm".into(), about: String::new() }];
-        let declared =
-            Declared { signals, parameters: vec![Parameter::new("gain", 1.0)], ..Declared::default() };
-        let mut watch = NamedWatch::new(&declared);
+        let signals = [Signal { name: "a".into(), unit: "mm".into(), about: String::new() }];
+        let mut signals = signals.iter().map(SignalFigures::new).collect::<Vec<_>>();
+        let mut parameters = vec![ParameterFigures::new(&Parameter::new("gain", 1.0))];
         for value in [2.0, f64::NAN, -1.0, 5.0] {
-            watch.add_signals(&Signals { signals: values(&[value]), ..Signals::default() });
+            let message = Signals { signals: values(&[value]), ..Signals::default() };
+            SignalFigures::add_all(&mut signals, &message);
         }
         for value in [1.0, 3.0, 3.0, 2.0] {
-            watch.add_parameters(&Parameters { parameters: values(&[value]), ..Parameters::default() });
+            let message = Parameters { parameters: values(&[value]), ..Parameters::default() };
+            ParameterFigures::add_all(&mut parameters, &message);
         }
-        let NamedWatch { signals, parameters } = watch;
         let SignalFigures { values, not_finite, min, mean, max, last, .. } = signals[0];
         assert_eq!((values, not_finite), (3, 1));
         assert_eq!([min, mean, max, last], [Some(-1.0), Some(2.0), Some(5.0), Some(5.0)]);

@@ -115,7 +115,7 @@ fn a_jump_of_the_clock_excuses_runs_on_real_interfaces_alone() {
 #[test]
 fn the_exit_codes_of_scenarios_are_those_of_the_program() {
     for expected in ExpectedVerdict::ALL {
-        assert_eq!(Outcome::Named(expected).exit() as u8, expected.exit_code(), "{expected:?}");
+        assert_eq!(Outcome::Named(expected).word_and_exit().1 as u8, expected.exit_code(), "{expected:?}");
     }
     assert_eq!((Outcome::Invalid.named(), Outcome::ChecksFailed.named()), (None, Some(Fail)));
 }

@@ -262,7 +262,7 @@ fn in_order(states: &[ControllerState], motion: PlayedMotion) -> Option<Disorder
     for (cycle, state) in (1..).zip(states) {
         order.advance(Some(state.code()), Some(&reading(cycle, cycle >= 3)), true);
     }
-    order.disorder().0
+    order.disorder().map(|(disorder, _)| disorder)
 }
 
 fn reading(cycle: u64, are_enabled: bool) -> Reading {

@@ -111,15 +111,7 @@ impl Requirements {
 
     /// The margin of a requirement so far, in the unit in which it is shown; none before it shows.
     pub(crate) fn margin_so_far(&mut self, place: usize) -> Option<f64> {
-        let finding = match &mut self.list[place].kind {
-            Kind::Bounds(bounds) => bounds.finding(),
-            // The windows that are open end here, but only in a copy.
-            Kind::Response(response) => response.clone().into_finding(),
-            Kind::Never(never) => never.finding(),
-            Kind::Count(count) => count.finding(),
-            Kind::Order(order) => order.finding(),
-            Kind::Unknown(_) => return None,
-        };
+        let (_, finding) = self.list[place].must_and_finding();
         finding.margin.map(|margin| margin / finding.unit.si)
     }
 
@@ -239,17 +231,23 @@ impl Requirement {
         }
     }
 
+    /// What must hold, in words, and what the samples so far come to.
+    fn must_and_finding(&mut self) -> (String, Finding) {
+        match &mut self.kind {
+            Kind::Bounds(bounds) => (bounds.must(), bounds.finding()),
+            // The windows that are open end here, but only in a copy.
+            Kind::Response(response) => (response.must(), response.clone().into_finding()),
+            Kind::Never(never) => (never.must(), never.finding()),
+            Kind::Count(count) => (count.must(), count.finding()),
+            Kind::Order(order) => (order.must(), order.finding()),
+            Kind::Unknown(why) => (String::new(), Finding::untested(why.clone(), Dimension::One.si_unit())),
+        }
+    }
+
     /// What it comes to. `motion_ns` is when the motion began.
-    fn into_figures(self, motion_ns: Option<u64>) -> RequirementFigures {
-        let is_truth = self.is_truth();
-        let (must, finding, plot) = match self.kind {
-            Kind::Bounds(mut bounds) => (bounds.must(), bounds.finding(), Some(bounds.plot())),
-            Kind::Response(response) => (response.must(), response.into_finding(), None),
-            Kind::Never(never) => (never.must(), never.finding(), None),
-            Kind::Count(count) => (count.must(), count.finding(), None),
-            Kind::Order(order) => (order.must(), order.finding(), None),
-            Kind::Unknown(why) => (String::new(), Finding::untested(why, Dimension::One.si_unit()), None),
-        };
+    fn into_figures(mut self, motion_ns: Option<u64>) -> RequirementFigures {
+        let (is_truth, (must, finding)) = (self.is_truth(), self.must_and_finding());
+        let plot = if let Kind::Bounds(bounds) = &mut self.kind { Some(bounds.plot()) } else { None };
         let since_motion_s = |ns: u64| Some((ns as f64 - motion_ns? as f64) / 1e9);
         RequirementFigures {
             name: self.name,

@@ -61,6 +61,10 @@ fn require(figures: &mut Figures, result: CheckResult, is_truth: bool) {
     });
 }
 
+fn result(of: Shortfall) -> CheckResult {
+    of.check("sequence", &Figures::default()).result
+}
+
 #[test]
 fn the_jaw_goes_the_way_of_the_scenarios_motion() {
     assert_eq!(shortfall(|_, _| ()), None);
@@ -70,7 +74,7 @@ fn the_jaw_goes_the_way_of_the_scenarios_motion() {
         assert_eq!(found, Some(Shortfall::NotPlayed { share, way_mm: 900.0 }));
     }
     let none = shortfall(|_, figures| figures.motion.played = Some(f64::NAN)).unwrap();
-    assert_eq!(none.result(), CheckResult::Failed, "NaN is no share");
+    assert_eq!(result(none), CheckResult::Failed, "NaN is no share");
     let still = Shortfall::NotPlayed { share: 0.004, way_mm: 900.0 };
     assert!(
         still.to_string().starts_with("the scenario's motion was not played: 0 % of its way of 900.0 mm; ")
@@ -81,7 +85,7 @@ fn the_jaw_goes_the_way_of_the_scenarios_motion() {
 fn a_motion_that_moves_nothing_and_one_that_is_unknown_are_untested() {
     let still = |figures: &mut Figures| (figures.motion.way_mm, figures.motion.played) = (Some(0.0), None);
     assert_eq!(shortfall(|_, figures| still(figures)), Some(Shortfall::Still));
-    assert_eq!(Shortfall::Still.result(), CheckResult::Untested);
+    assert_eq!(result(Shortfall::Still), CheckResult::Untested);
     let stopped = shortfall(|_, figures| {
         still(figures);
         stop_by_request(figures);
@@ -95,7 +99,7 @@ fn a_motion_that_moves_nothing_and_one_that_is_unknown_are_untested() {
 fn states_out_of_order_fail_and_a_stop_by_request_excuses_a_motion_that_never_began() {
     let never = |change: fn(&mut Manifest, &mut Figures)| {
         shortfall(|manifest, figures| {
-            (manifest.ending, figures.disorder) = (Ending::Completed, Some(Disorder::NeverBegan));
+            (manifest.ending, figures.disorder) = (Ending::Completed, Some((Disorder::NeverBegan, None)));
             change(manifest, figures);
         })
     };
@@ -105,20 +109,21 @@ fn states_out_of_order_fail_and_a_stop_by_request_excuses_a_motion_that_never_be
     assert_eq!(never(|_, figures| figures.final_state = Some(Code::Known(ControllerState::Enabling))), found);
     assert_eq!(never(|_, figures| stop_by_request(figures)), None);
     let died = shortfall(|_, figures| {
-        (figures.final_state, figures.disorder) = (enabling, Some(Disorder::NeverBegan));
+        (figures.final_state, figures.disorder) = (enabling, Some((Disorder::NeverBegan, None)));
     });
     assert_eq!(died, None, "the supervisor has not entered an end");
     let back = Disorder::Back { from: ControllerState::Running, to: ControllerState::Easing };
-    let found = shortfall(|_, figures| figures.disorder = Some(back)).unwrap();
-    assert_eq!(found.result(), CheckResult::Failed);
+    let found = shortfall(|_, figures| figures.disorder = Some((back, None))).unwrap();
+    assert_eq!(result(found), CheckResult::Failed);
     assert_eq!(found.to_string(), "the controller went back from the state running to easing");
 }
 
 #[test]
 fn a_controller_that_waited_for_ever_did_not_begin_or_did_not_end() {
-    let overdue = |state, has_begun, disorder| {
+    let overdue = |state, has_begun, disorder: Option<Disorder>| {
         shortfall(|manifest, figures| {
-            (manifest.ending, figures.disorder) = (Ending::Overdue, disorder);
+            (manifest.ending, figures.disorder) =
+                (Ending::Overdue, disorder.map(|disorder| (disorder, None)));
             (figures.final_state, figures.has_begun) = (Some(Code::Known(state)), has_begun);
             // What the plant did at the deadline.
             figures.stopped_by = Some(StoppedBy::QuickStop);
@@ -134,7 +139,7 @@ fn a_controller_that_waited_for_ever_did_not_begin_or_did_not_end() {
         (ControllerState::Finished, true, never, "did not end within "),
     ] {
         let found = overdue(state, has_begun, disorder).unwrap();
-        assert_eq!(found.result(), CheckResult::Failed);
+        assert_eq!(result(found), CheckResult::Failed);
         assert!(found.to_string().starts_with(&format!("the controller {finding}")), "{found}");
     }
 }
@@ -149,9 +154,9 @@ fn what_falls_short_has_a_value_a_limit_and_a_time() {
             change(manifest, figures);
             run = figures.clone();
         });
-        short.and_then(|short| short.breach(&run)).map(|breach| {
+        short.and_then(|short| short.check("sequence", &run).breach).map(|breach| {
             let motion_ns = run.path_breach.motion_ns.map(|[began_ns, _]| began_ns);
-            earliest([breach.of("sequence".into())].into_iter(), motion_ns).unwrap().to_string()
+            earliest([breach].into_iter(), motion_ns).unwrap().to_string()
         })
     };
     let early = |manifest: &mut Manifest, figures: &mut Figures| {
@@ -159,7 +164,7 @@ fn what_falls_short_has_a_value_a_limit_and_a_time() {
     };
     let back = |_: &mut Manifest, figures: &mut Figures| {
         let back = Disorder::Back { from: ControllerState::Running, to: ControllerState::Easing };
-        (figures.disorder, figures.disorder_ns) = (Some(back), Some(3_500_000_000));
+        figures.disorder = Some((back, Some(3_500_000_000)));
     };
     let cases: [(Change, Option<&str>); 4] = [
         (
@@ -253,7 +258,7 @@ fn an_expected_safe_stop_needs_more_than_the_controllers_word() {
     for (number, (change, expected)) in cases.into_iter().enumerate() {
         assert_eq!(stopped(expect, change), expected, "case {number}");
     }
-    assert_eq!(Shortfall::OnlyStated.result(), CheckResult::Untested);
+    assert_eq!(result(Shortfall::OnlyStated), CheckResult::Untested);
     assert_eq!(stopped("", |_| ()), None, "such a stop is no pass anyway");
 }
 

@@ -5,7 +5,7 @@ use std::io::{self, ErrorKind};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
-use masseter_judge::{Analysis, Figures, Judgement, Verdict};
+use masseter_judge::{Analysis, Figures, Verdict};
 use masseter_recording::{Manifest, ReadError, Reader, Recorded, RunFolder, manifest_of};
 use masseter_runtime::messages::tap::{self, TapError};
 use masseter_scenario::Scenario;
@@ -37,8 +37,8 @@ pub(crate) enum AnalysisError {
 /// let manifest = Manifest::read(&folder)?;
 /// let reserved = std::fs::File::create(folder.file("reserved"))?;
 /// let shown = Some((Format::Human, Detail::Brief));
-/// let judgement = report_run(&folder, &manifest, shown, reserved).map_err(|failure| failure.error)?;
-/// println!("{:?}", judgement.verdict.exit_code);
+/// let verdict = report_run(&folder, &manifest, shown, reserved).map_err(|failure| failure.error)?;
+/// println!("{:?}", verdict.exit_code);
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 ///
@@ -49,12 +49,12 @@ pub fn report_run(
     manifest: &Manifest,
     shown: Option<(Format, Detail)>,
     reserved: File,
-) -> Result<Judgement, Failure> {
+) -> Result<Verdict, Failure> {
     let analysed = analyse(folder, manifest, Some(folder.path()));
     let (figures, logged) = analysed.context("the run's recording cannot be analysed").incomplete()?;
-    let (judgement, written) = show_and_write(folder, manifest, &figures, logged, shown, Some(reserved))?;
+    let (verdict, written) = show_and_write(folder, manifest, &figures, logged, shown, Some(reserved))?;
     written.incomplete()?;
-    Ok(judgement)
+    Ok(verdict)
 }
 
 /// `masseter report`: the same of a past run, with assignments to keys of `[study]`. Where its folder is read-only, the run is shown and no file is written.
@@ -77,7 +77,7 @@ pub fn report_past_run(path: &Path, set: &[String], format: Format) -> Result<Ex
     choose_cycles(&mut manifest.scenario, set).usage()?;
     let (figures, logged) = analyse(&folder, &manifest, Some(folder.path())).usage()?;
     let shown = Some((format, Detail::Whole));
-    let (judgement, written) = show_and_write(&folder, &manifest, &figures, logged, shown, None)?;
+    let (verdict, written) = show_and_write(&folder, &manifest, &figures, logged, shown, None)?;
     match written {
         Err(WriteError { path, error }) if is_read_only(&error) => status!(
             "masseter: cannot write {}: {error}; the run is shown, and no file written",
@@ -85,7 +85,7 @@ pub fn report_past_run(path: &Path, set: &[String], format: Format) -> Result<Ex
         ),
         written => written.incomplete()?,
     }
-    Ok(judgement.verdict.exit_code)
+    Ok(verdict.exit_code)
 }
 
 /// Writes the page of a failed run again, with until when the run could pass; returns its place.
@@ -150,18 +150,18 @@ fn show_and_write(
     logged: Result<(), WriteError>,
     shown: Option<(Format, Detail)>,
     reserved: Option<File>,
-) -> Result<(Judgement, Result<(), WriteError>), Failure> {
-    let judgement = Judgement::new(manifest, figures);
-    let documents = Documents::new(manifest, figures, &judgement.verdict)?;
+) -> Result<(Verdict, Result<(), WriteError>), Failure> {
+    let verdict = Verdict::new(manifest, figures);
+    let documents = Documents::new(manifest, figures, &verdict)?;
     let shown = match shown {
         None => Ok(()),
         Some((Format::Human, detail)) => {
-            let table = table::table_in_words(manifest, figures, &judgement.verdict, detail);
+            let table = table::table_in_words(manifest, figures, &verdict, detail);
             let more = if detail == Detail::Brief { "; --verbose shows every figure" } else { "" };
-            let said = table::verdict_in_words(&judgement.verdict, folder.path());
+            let said = table::verdict_in_words(&verdict, folder.path());
             let report = format!("report: {}{more}\n", folder.file("report.html").display());
             // What failed is the last that a screen shows; a pass fits on one.
-            let text = match judgement.verdict.exit_code {
+            let text = match verdict.exit_code {
                 Exit::Passed => format!("{said}{table}\n{report}"),
                 _ => format!("{table}\n{report}{said}"),
             };
@@ -172,7 +172,7 @@ fn show_and_write(
     drop(reserved);
     let written = documents.write(folder, figures, logged);
     shown.incomplete()?;
-    Ok((judgement, written))
+    Ok((verdict, written))
 }
 
 /// The documents of a report.

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
-use masseter_judge::{Check, Judgement, Verdict};
+use masseter_judge::{Check, Verdict};
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use masseter_terminal::Exit;
 use serde::{Deserialize, Serialize};
@@ -45,8 +45,8 @@ impl Outcome {
 /// A run of a scenario.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Attempt {
-    /// Its judgement, or why it could not run.
-    pub judgement: Result<Judgement, String>,
+    /// Its verdict, or why it could not run.
+    pub verdict: Result<Verdict, String>,
     /// The folder of the run, if it was kept.
     pub folder: Option<PathBuf>,
 }
@@ -54,7 +54,7 @@ pub struct Attempt {
 impl Attempt {
     /// The verdict, or why there is none.
     pub fn verdict(&self) -> Result<&Verdict, &str> {
-        self.judgement.as_ref().map(|judgement| &judgement.verdict).map_err(String::as_str)
+        self.verdict.as_ref().map_err(String::as_str)
     }
 
     /// How the attempt counts.
@@ -83,11 +83,9 @@ impl Attempt {
 
     /// Whether the rig did the same in both, with the same verdict.
     pub fn is_same(&self, other: &Self) -> bool {
-        let what = |attempt: &Self| {
-            let judgement = attempt.judgement.as_ref();
-            judgement.map(|found| (found.verdict.word, found.digest.clone())).map_err(Clone::clone)
-        };
-        what(self) == what(other)
+        let [one, other] =
+            [self, other].map(|of| of.verdict().map(|verdict| (verdict.word, &verdict.digest)));
+        one == other
     }
 
     /// The verdict in a word, and its reason.

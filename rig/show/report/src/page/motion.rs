@@ -139,7 +139,7 @@ pub(super) fn pressure_section(figures: &Figures) -> Option<Section> {
         number: tooth.number,
         across_mm: -tooth.place_m[1] * 1e3,
         forward_mm: tooth.place_m[0] * 1e3,
-        points: Points::over_time(&tooth.course_n),
+        points: Points::over_time(&tooth.force_n.highest()),
     };
     let pressure = Pressure {
         teeth: contact.teeth.iter().map(tooth).collect(),

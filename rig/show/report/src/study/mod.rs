@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 use masseter_judge::{
-    CycleQuantity, JawCycleFigures, Judgement, Statistic, TrackingSample, closed_incisal_m, incisal_m,
+    CycleQuantity, JawCycleFigures, Statistic, TrackingSample, Verdict, closed_incisal_m, incisal_m,
     missing_part,
 };
 use masseter_recording::{RunFolder, manifest_of};
@@ -224,7 +224,7 @@ fn recorded(path: &Path, by: &By, set: &[String]) -> anyhow::Result<Recorded> {
         Ok(Recorded {
             person: value_of(scenario, &by.person)?.unwrap_or_default(),
             condition: value_of(scenario, &by.condition)?.unwrap_or_else(|| "all".to_owned()),
-            verdict: Judgement::new(&manifest, &figures).verdict.word.to_string(),
+            verdict: Verdict::new(&manifest, &figures).word.to_owned(),
             is_true: figures.tracking.actual_source.is_truth(),
             path_mm: figures.track.iter().filter(has_begun).map(place).collect(),
             jaw: figures.jaw_cycles,

@@ -7,9 +7,9 @@ use serde_json::Value;
 use super::*;
 use crate::{html_of_suite, junit_of_suite};
 
-/// What the suite has of a scenario that could be played: a judgement with this word, exit code and digest, and with a requirement of this margin.
+/// What the suite has of a scenario that could be played: a verdict with this word, exit code and digest, and with a requirement of this margin.
 #[expect(clippy::unnecessary_wraps, reason = "the suite's results are of this type")]
-fn judged(word: &'static str, exit_code: Exit, digest: &str, margin: f64) -> Result<Judgement, String> {
+fn judged(word: &'static str, exit_code: Exit, digest: &str, margin: f64) -> Result<Verdict, String> {
     let text = "[[require]]\nname = 'force'\nid = 'REQ-12'\nsignal = 'l1.force'\nmax = '3 N'";
     let scenario = Scenario::parse("s.toml".as_ref(), text).unwrap();
     let machine = MachineInfo { cpu: String::new(), cores: 2, kernel: String::new(), is_virtual: false };
@@ -25,19 +25,20 @@ fn judged(word: &'static str, exit_code: Exit, digest: &str, margin: f64) -> Res
     found.figures =
         Some(CheckFigures { margin: Some(margin), relative_margin: Some(margin / 3.0), ..figures });
     (verdict.word, verdict.exit_code, verdict.reason) = (word, exit_code, format!("it is {word}"));
-    Ok(Judgement { verdict, digest: digest.to_owned() })
+    digest.clone_into(&mut verdict.digest);
+    Ok(verdict)
 }
 
-fn passed(margin: f64) -> Result<Judgement, String> {
+fn passed(margin: f64) -> Result<Verdict, String> {
     judged("PASS", Exit::Passed, "a", margin)
 }
 
-fn tested(name: &str, judgements: Vec<Result<Judgement, String>>) -> TestedScenario {
+fn tested(name: &str, verdicts: Vec<Result<Verdict, String>>) -> TestedScenario {
     TestedScenario {
         name: name.to_owned(),
         file: format!("suite/{name}.toml").into(),
         tags: vec!["slow".to_owned()],
-        attempts: judgements.into_iter().map(|judgement| Attempt { judgement, folder: None }).collect(),
+        attempts: verdicts.into_iter().map(|verdict| Attempt { verdict, folder: None }).collect(),
         is_simulated: true,
         allows_untested: false,
         command: format!("masseter run suite/{name}.toml"),
@@ -53,9 +54,9 @@ fn report(tested: Vec<TestedScenario>, baseline: Option<Baseline>) -> SuiteRepor
 #[test]
 fn warnings_of_the_plan_are_in_every_form_also_where_results_differ() {
     let warned = |digest| {
-        let mut judgement = judged("PASS", Exit::Passed, digest, 1.0).unwrap();
-        judgement.verdict.warnings = ["the first row is away", "a row jumps"].map(str::to_owned).into();
-        Ok(judgement)
+        let mut verdict = judged("PASS", Exit::Passed, digest, 1.0).unwrap();
+        verdict.warnings = ["the first row is away", "a row jumps"].map(str::to_owned).into();
+        Ok(verdict)
     };
     for attempts in [vec![warned("a")], vec![warned("a"), warned("b")]] {
         let report = report(vec![tested("one", attempts)], None);
@@ -74,7 +75,7 @@ fn warnings_of_the_plan_are_in_every_form_also_where_results_differ() {
 #[test]
 fn the_document_of_a_suite_says_what_to_do_next() {
     let mut failed = judged("FAIL", Exit::Failed, "a", -1.0).unwrap();
-    failed.verdict.next_step = Some("Look there.".to_owned());
+    failed.next_step = Some("Look there.".to_owned());
     let xml = junit_of_suite(&report(vec![tested("one", vec![Ok(failed)])], None)).unwrap();
     assert!(xml.contains("<property name=\"next step\" value=\"Look there.\"/>"), "{xml}");
 }
@@ -112,10 +113,10 @@ fn a_result_that_changes_in_simulated_time_is_a_failure_of_its_own() {
 
 #[test]
 fn a_suite_is_invalid_if_the_machine_spoiled_all_that_did_not_pass() {
-    let judgements =
+    let verdicts =
         [passed(1.0), judged("INVALID", Exit::Invalid, "a", 0.0), judged("FAIL", Exit::Failed, "a", -1.0)];
     let [passed, spoiled, failed] =
-        judgements.map(|judgement| TestedScenario { is_simulated: false, ..tested("one", vec![judgement]) });
+        verdicts.map(|verdict| TestedScenario { is_simulated: false, ..tested("one", vec![verdict]) });
     for (tested, exit, word) in [
         (vec![passed.clone()], Exit::Passed, "INTERRUPTED"),
         (vec![passed, spoiled.clone(), spoiled.clone()], Exit::Invalid, "INVALID"),
