@@ -165,7 +165,6 @@ impl Analysis {
         match message {
             Recorded::Command(command) => {
                 self.shown.iter_mut().for_each(|shown| shown.apply_command(command));
-                self.axes.iter_mut().for_each(|axes| axes.apply_command(command));
             }
             Recorded::Reading(reading) => self.apply_reading(reading),
             Recorded::State(state) => self.apply_state(state),
@@ -221,7 +220,6 @@ impl Analysis {
         let is_of_scenario = self.stalls.apply_reading(reading);
         let skipped = self.plant_skips.account(&Counters::from(reading), self.period_ns, is_of_scenario);
         self.shown.iter_mut().for_each(|shown| shown.apply_reading(reading, skipped));
-        self.axes.iter_mut().for_each(|axes| axes.apply_reading(reading));
         self.outage.apply_reading(reading, is_of_scenario);
         if self.stop.apply_reading(reading) {
             self.tracking.stop(reading.cycle);
@@ -280,6 +278,7 @@ impl Analysis {
             let is_excused = messages.is_disturbed && self.controller_skips.figures.worked_ns > 0;
             self.played.add_reading(reading, messages.controller_state, is_excused);
         }
+        self.axes.iter_mut().for_each(|axes| axes.add_cycle(messages));
         self.bite_estimate.iter_mut().for_each(|estimate| estimate.add(messages));
         self.requirements.iter_mut().for_each(|requirements| requirements.judge_sample(sample));
     }

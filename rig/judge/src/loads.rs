@@ -1,13 +1,14 @@
 //! The greatest loads of teeth and drives: what the lower teeth of the emulated jaw bore, and how each drive of a dry run met
 //! the demands. Which load is too great is no question here.
 
+use std::collections::VecDeque;
+
 use masseter_model::geometry::AXES;
-use masseter_runtime::messages::codes::ControllerState;
-use masseter_runtime::messages::{Command, Contact, Reading};
+use masseter_runtime::messages::Contact;
 use masseter_scenario::Scenario;
 use serde::Serialize;
 
-use crate::series::{Band, ByCycle};
+use crate::{poses::is_running, series::Band, signals::CycleMessages};
 
 /// What the teeth of the emulated jaw bore.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -117,45 +118,43 @@ pub struct AxisFigures {
 #[derive(Debug, Clone, Default)]
 pub(super) struct AxisWatch {
     /// From a command to the reading of the position that its targets lead to.
-    lead_cycles: u64,
-    targets_m: ByCycle<[f64; AXES]>,
-    /// Positions and forces.
-    found: ByCycle<([f64; AXES], [f64; AXES])>,
+    lead_cycles: usize,
+    /// The targets whose positions are still to come; none of a cycle without a command of the motion.
+    targets_m: VecDeque<Option<[f64; AXES]>>,
+    last_cycle: u64,
+    /// Cycles in a row with targets and positions.
+    undisturbed: u64,
     pub(super) figures: [AxisFigures; AXES],
 }
 
 impl AxisWatch {
     pub(super) fn new(scenario: &Scenario) -> Self {
-        Self { lead_cycles: scenario.controller.lead_cycles.round() as u64, ..Self::default() }
+        Self { lead_cycles: scenario.controller.lead_cycles.round() as usize, ..Self::default() }
     }
 
-    pub(super) fn apply_command(&mut self, command: &Command) {
-        if command.controller_state == ControllerState::Running.code() {
-            self.targets_m.insert(command.cycle, command.target_m);
-            self.compare(command.cycle);
+    /// Takes the next cycle in the order of time.
+    pub(super) fn add_cycle(&mut self, messages: &CycleMessages) {
+        if std::mem::replace(&mut self.last_cycle, messages.cycle) + 1 != messages.cycle {
+            (self.undisturbed, self.targets_m) = (0, VecDeque::new());
         }
-    }
-
-    pub(super) fn apply_reading(&mut self, reading: &Reading) {
-        self.found.insert(reading.cycle, (reading.position_m, reading.force_n));
-        self.compare(reading.cycle.saturating_sub(self.lead_cycles));
-    }
-
-    /// Compares the targets of a cycle with the positions that they led to, once both are known.
-    fn compare(&mut self, cycle: u64) {
-        let pair = self.targets_m.get(cycle).zip(self.found.get(cycle + self.lead_cycles));
-        let Some((targets_m, (positions_m, forces_n))) = pair else { return };
-        let is_there = |cycle: u64| {
-            self.targets_m.get(cycle).is_some() && self.found.get(cycle + self.lead_cycles).is_some()
-        };
-        if !(cycle.saturating_sub(UNDISTURBED)..cycle).all(is_there) {
+        let command = messages.command.filter(|command| is_running(Some(command.controller_state)));
+        self.targets_m.push_back(command.map(|command| command.target_m));
+        if self.targets_m.len() <= self.lead_cycles {
             return;
         }
-        for (axis, figures) in self.figures.iter_mut().enumerate() {
-            let error_m = (targets_m[axis] - positions_m[axis]).abs();
-            figures.following_error_m = figures.following_error_m.max(error_m);
-            figures.force_n = figures.force_n.max(forces_n[axis].abs());
+        let targets_m = self.targets_m.pop_front().flatten();
+        let Some((targets_m, reading)) = targets_m.zip(messages.reading) else {
+            self.undisturbed = 0;
+            return;
+        };
+        if self.undisturbed >= UNDISTURBED {
+            for (axis, figures) in self.figures.iter_mut().enumerate() {
+                let error_m = (targets_m[axis] - reading.position_m[axis]).abs();
+                figures.following_error_m = figures.following_error_m.max(error_m);
+                figures.force_n = figures.force_n.max(reading.force_n[axis].abs());
+            }
         }
+        self.undisturbed += 1;
     }
 }
 

@@ -6,7 +6,7 @@ use masseter_runtime::named::Declared;
 use masseter_scenario::{Scenario, input::excerpt};
 
 use crate::signals::{CycleMessages, Pace, Registry, Timeline, UnknownSignal, Values};
-use crate::{events::EventRecord, poses::is_running, requirements::Requirements};
+use crate::{events::EventRecord, requirements::Requirements};
 
 /// The scenario has no requirement of that name.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -28,7 +28,6 @@ pub struct Watch {
     messages: CycleMessages,
     events: Vec<EventRecord>,
     row: Vec<f64>,
-    has_begun: bool,
 }
 
 impl Watch {
@@ -42,7 +41,6 @@ impl Watch {
             messages: CycleMessages::default(),
             events: Vec::new(),
             row: Vec::new(),
-            has_begun: false,
         }
     }
 
@@ -70,11 +68,6 @@ impl Watch {
     pub fn take(&mut self, message: &Recorded) {
         if let Some(sample) = self.timeline.take(message) {
             self.requirements.judge_sample(&sample);
-            if !self.has_begun && is_running(sample.messages.controller_state) {
-                // Some signals count from this sample.
-                self.values.take(&sample.messages, &mut self.row);
-                self.has_begun = true;
-            }
             self.messages = CycleMessages { cycle: sample.messages.cycle + 1, ..sample.messages };
         }
         let messages = &mut self.messages;

@@ -30,6 +30,9 @@ mod contact {
 }
 
 mod axes {
+    use masseter_runtime::messages::codes::ControllerState;
+    use masseter_runtime::messages::{Command, Reading};
+
     use super::*;
 
     /// A drive that lags by 1 µm, and by 1 mm just after a lost reading.
@@ -39,17 +42,15 @@ mod axes {
         let controller_state = ControllerState::Running.code();
         for cycle in 1..=60_u64 {
             let target_m = [cycle as f64 * 1e-3; AXES];
-            watch.apply_command(&Command { cycle, target_m, controller_state, ..Command::default() });
             let late_m = if (31..40).contains(&cycle) { 1e-3 } else { 1e-6 };
             let position_m = [cycle.saturating_sub(2) as f64 * 1e-3 - late_m; AXES];
-            if cycle != 30 {
-                watch.apply_reading(&Reading {
-                    cycle,
-                    position_m,
-                    force_n: [-7.0; AXES],
-                    ..Reading::default()
-                });
-            }
+            let reading = Reading { position_m, force_n: [-7.0; AXES], ..Reading::default() };
+            watch.add_cycle(&CycleMessages {
+                cycle,
+                command: Some(Command { target_m, controller_state, ..Command::default() }),
+                reading: (cycle != 30).then_some(reading),
+                ..CycleMessages::default()
+            });
         }
         let [figures, ..] = watch.figures;
         assert!((figures.following_error_m - 1e-6).abs() < 1e-12, "{figures:?}");

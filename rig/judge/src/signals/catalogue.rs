@@ -9,7 +9,7 @@ use masseter_runtime::messages::{Truth, WORKS};
 use masseter_runtime::named::{Declared, PlayedMotion};
 use masseter_scenario::{MotionConfig, Scenario, Unit};
 
-use super::signal::{Jaw, JawPoint, NamedSignal, SignalList, estimated};
+use super::signal::{Jaw, JawPoint, NamedSignal, SignalList};
 use super::timeline::CycleMessages;
 use crate::pressure::{PressedTooth, Pressure};
 use crate::{condyles::Condyles, poses::true_pose};
@@ -73,7 +73,7 @@ fn add_jaw(list: &mut SignalList, jaw: Jaw, has_contact: bool) {
         "incisal.estimated_error",
         Unit::MM,
         "Distance of the incisal point from its desired place, by forward kinematics.",
-        move |of| Some(jaw.distance(JawPoint::Incisal, &estimated(of)?, &of.desired?)),
+        move |of| Some(jaw.distance(JawPoint::Incisal, &of.estimated()?, &of.desired?)),
     );
     let ways = [
         ("jaw.opening", "down", Vec3::new(0.0, 0.0, -1.0)),
@@ -103,11 +103,11 @@ fn add_jaw(list: &mut SignalList, jaw: Jaw, has_contact: bool) {
         })
         .truth_if(jaw.has_truth);
     }
-    list.add_from(
+    list.add(
         "jaw.rotation",
         Unit::DEG,
         "Angle of the jaw from its orientation when the motion began.",
-        move |of, start| Some(jaw.actual(of)?.rotation.angle_to(&start?.rotation)),
+        move |of| Some(jaw.actual(of)?.rotation.angle_to(&of.start?.rotation)),
     )
     .truth_if(jaw.has_truth);
     list.add(

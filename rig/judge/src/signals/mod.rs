@@ -9,12 +9,10 @@ mod timeline;
 
 use std::sync::Arc;
 
-use masseter_model::geometry::Pose;
 use masseter_runtime::named::Declared;
 use masseter_scenario::{Scenario, input::excerpt, wording::nearest};
 
 use self::{catalogue::signals, signal::Jaw};
-use crate::poses::is_running;
 
 pub use signal::NamedSignal;
 pub use timeline::{CycleMessages, Pace, Sample, Timeline};
@@ -50,21 +48,17 @@ impl UnknownSignal {
 /// # Ok::<(), masseter_judge::signals::UnknownSignal>(())
 /// ```
 #[derive(Debug)]
-pub struct Registry {
-    signals: Vec<NamedSignal>,
-    jaw: Jaw,
-}
+pub struct Registry(Vec<NamedSignal>);
 
 impl Registry {
     /// The signals of a run of this scenario whose controller declares these.
     pub fn new(scenario: &Scenario, declared: &Declared) -> Self {
-        let jaw = Jaw::new(scenario);
-        Self { signals: signals(scenario, jaw, declared), jaw }
+        Self(signals(scenario, Jaw::new(scenario), declared))
     }
 
     /// Every signal.
     pub fn signals(&self) -> &[NamedSignal] {
-        &self.signals
+        &self.0
     }
 
     /// The place of the signal of that name.
@@ -72,10 +66,10 @@ impl Registry {
     /// # Errors
     /// [`UnknownSignal`] with the most similar name.
     pub fn place_of(&self, name: &str) -> Result<usize, UnknownSignal> {
-        let place = |name: &str| self.signals.iter().position(|signal| signal.name == name);
+        let place = |name: &str| self.0.iter().position(|signal| signal.name == name);
         place(name).ok_or_else(|| {
             let own = format!("signal.{name}");
-            let names = self.signals.iter().map(|signal| signal.name.as_str());
+            let names = self.0.iter().map(|signal| signal.name.as_str());
             let likely = if place(&own).is_some() { Some(&*own) } else { nearest(name, names) };
             let question = match likely {
                 Some(likely) => format!("; did you mean '{likely}'?"),
@@ -89,14 +83,13 @@ impl Registry {
         })
     }
 
-    /// The value of the signal of that name in a cycle, in its unit. None if the cycle lacks a message, or if the
-    /// signal counts from the start of the motion.
+    /// The value of the signal of that name in a cycle, in its unit. None if the cycle lacks a message.
     ///
     /// # Errors
     /// As [`Self::place_of`].
     pub fn value(&self, name: &str, messages: &CycleMessages) -> Result<Option<f64>, UnknownSignal> {
-        let signal = &self.signals[self.place_of(name)?];
-        Ok(signal.value(messages, None).map(|si| si / signal.shown().si))
+        let signal = &self.0[self.place_of(name)?];
+        Ok(signal.value(messages).map(|si| si / signal.shown().si))
     }
 }
 
@@ -106,14 +99,12 @@ pub struct Values {
     registry: Arc<Registry>,
     /// The places of the chosen signals.
     chosen: Vec<usize>,
-    /// The pose of the jaw in the first cycle of the motion.
-    start: Option<Pose>,
 }
 
 impl Values {
     /// None chosen yet.
     pub fn new(registry: Registry) -> Self {
-        Self { registry: Arc::new(registry), chosen: Vec::new(), start: None }
+        Self { registry: Arc::new(registry), chosen: Vec::new() }
     }
 
     /// Every signal, at its place in the registry.
@@ -140,13 +131,10 @@ impl Values {
     }
 
     /// The values of the chosen signals in a cycle; NaN where the cycle does not have one.
-    pub fn take(&mut self, messages: &CycleMessages, values: &mut Vec<f64>) {
-        if self.start.is_none() && is_running(messages.controller_state) {
-            self.start = self.registry.jaw.actual(messages);
-        }
+    pub fn take(&self, messages: &CycleMessages, values: &mut Vec<f64>) {
         values.clear();
         let signals = self.registry.signals();
-        let value = |&place: &usize| signals[place].value(messages, self.start.as_ref()).unwrap_or(f64::NAN);
+        let value = |&place: &usize| signals[place].value(messages).unwrap_or(f64::NAN);
         values.extend(self.chosen.iter().map(value));
     }
 }

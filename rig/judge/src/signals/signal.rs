@@ -9,11 +9,10 @@ use masseter_scenario::{Scenario, Unit};
 use serde::Serialize;
 
 use super::timeline::CycleMessages;
-use crate::poses::{closed_platform, estimated_pose, place, true_pose, turn, way};
+use crate::poses::{closed_platform, place, turn, way};
 
-/// How a signal's value follows from a cycle, and from the pose of the jaw in the first cycle of the motion. None if
-/// the cycle lacks it.
-type Extract = Box<dyn Fn(&CycleMessages, Option<&Pose>) -> Option<f64> + Send + Sync>;
+/// How a signal's value follows from a cycle. None if the cycle lacks it.
+type Extract = Box<dyn Fn(&CycleMessages) -> Option<f64> + Send + Sync>;
 
 /// The names of the values of a state.
 type StateNames = fn() -> Vec<(&'static str, u32)>;
@@ -48,9 +47,9 @@ impl fmt::Debug for NamedSignal {
 }
 
 impl NamedSignal {
-    /// Its value in a cycle of a run whose motion began with this pose of the jaw.
-    pub(super) fn value(&self, messages: &CycleMessages, start: Option<&Pose>) -> Option<f64> {
-        (self.extract)(messages, start)
+    /// Its value in a cycle.
+    pub(super) fn value(&self, messages: &CycleMessages) -> Option<f64> {
+        (self.extract)(messages)
     }
 
     /// Says whether it shows the mechanism itself, and not what a controller states of it.
@@ -74,24 +73,13 @@ impl NamedSignal {
 pub(super) struct SignalList(pub(super) Vec<NamedSignal>);
 
 impl SignalList {
-    /// Adds a signal whose value a cycle alone gives.
+    /// Adds a signal.
     pub(super) fn add(
-        &mut self,
-        name: impl Into<String>,
-        unit: Unit,
-        about: impl Into<String>,
-        extract: impl Fn(&CycleMessages) -> Option<f64> + Send + Sync + 'static,
-    ) -> &mut NamedSignal {
-        self.add_from(name, unit, about, move |messages, _| extract(messages))
-    }
-
-    /// Adds a signal whose value counts from the start of the motion.
-    pub(super) fn add_from(
         &mut self,
         name: impl Into<String>,
         shown: Unit,
         about: impl Into<String>,
-        extract: impl Fn(&CycleMessages, Option<&Pose>) -> Option<f64> + Send + Sync + 'static,
+        extract: impl Fn(&CycleMessages) -> Option<f64> + Send + Sync + 'static,
     ) -> &mut NamedSignal {
         let (name, unit, about, extract) =
             (name.into(), shown.name.to_owned(), about.into(), Box::new(extract));
@@ -178,9 +166,9 @@ impl Jaw {
         Some(point - axis * (point.y / axis.y))
     }
 
-    /// The pose that the jaw has: the true one where the mechanism is emulated, otherwise the estimated one.
+    /// The pose that the jaw has.
     pub(super) fn actual(&self, messages: &CycleMessages) -> Option<Pose> {
-        if self.has_truth { true_pose(messages.truth.as_ref()?) } else { estimated(messages) }
+        messages.actual(self.has_truth)
     }
 
     /// Where a point is in the base frame, m.
@@ -192,9 +180,4 @@ impl Jaw {
     pub(super) fn distance(&self, point: JawPoint, a: &Pose, b: &Pose) -> f64 {
         way(a, b, &self.points_m[point as usize]).norm()
     }
-}
-
-/// The pose that forward kinematics found.
-pub(super) fn estimated(messages: &CycleMessages) -> Option<Pose> {
-    estimated_pose(messages.solution.as_ref()?)
 }

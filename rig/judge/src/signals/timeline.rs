@@ -11,6 +11,7 @@ use masseter_runtime::named::Declared;
 use masseter_scenario::Scenario;
 
 use crate::events::EventRecord;
+use crate::poses::{estimated_pose, is_running, true_pose};
 use crate::reference::{Progress, Reference};
 
 /// The messages of a cycle; a missing message is `None`.
@@ -42,6 +43,8 @@ pub struct CycleMessages {
     pub is_awaited: bool,
     /// How far the desired pose has come on the motion, s, from any instant.
     pub progress_s: f64,
+    /// The actual pose in the first cycle of the motion; none before.
+    pub start: Option<Pose>,
     /// The controller's command.
     pub command: Option<Command>,
     /// The signals that the controller declares.
@@ -53,6 +56,16 @@ pub struct CycleMessages {
 }
 
 impl CycleMessages {
+    /// The pose that the jaw has: the true one where the mechanism is emulated, otherwise the estimated one.
+    pub(crate) fn actual(&self, has_truth: bool) -> Option<Pose> {
+        if has_truth { true_pose(self.truth.as_ref()?) } else { self.estimated() }
+    }
+
+    /// The pose that forward kinematics found.
+    pub(crate) fn estimated(&self) -> Option<Pose> {
+        estimated_pose(self.solution.as_ref()?)
+    }
+
     /// When the drives sampled, ns; without a sample the controller's deadline.
     pub fn time_ns(&self) -> Option<u64> {
         let sampled =
@@ -91,6 +104,9 @@ pub struct Timeline {
     parameters: Option<Parameters>,
     controller_state: Option<u32>,
     truth: Option<Truth>,
+    /// Whether the actual pose is the true one, or the estimated one.
+    has_truth: bool,
+    start: Option<Pose>,
     /// Deadlines that the controller's loop has skipped.
     skipped_cycles: u64,
     /// The motion beside which the run was played.
@@ -120,7 +136,8 @@ pub enum Pace {
 impl Timeline {
     /// Of a run of this scenario whose controller declares these.
     pub fn new(scenario: &Scenario, declared: &Declared, pace: Pace) -> Self {
-        Self { pace, reference: Reference::new(scenario, declared), ..Self::default() }
+        let (has_truth, reference) = (scenario.can.is_virtual(), Reference::new(scenario, declared));
+        Self { pace, has_truth, reference, ..Self::default() }
     }
 
     /// Takes a message of a cycle; hands out a cycle that is complete now.
@@ -213,6 +230,10 @@ impl Timeline {
         messages.controller_state = self.controller_state;
         messages.truth_before = self.truth.filter(|truth| truth.cycle + 1 == messages.cycle);
         self.truth = messages.truth;
+        if self.start.is_none() && is_running(messages.controller_state) {
+            self.start = messages.actual(self.has_truth);
+        }
+        messages.start = self.start;
         self.compare_with_motion(&mut messages);
         let controller = messages.state.map(|state| [state.woke_ns, state.worked_ns + state.spun_ns]);
         let plant = messages.reading.map(|reading| [reading.woke_ns, reading.worked_ns + reading.spun_ns]);
