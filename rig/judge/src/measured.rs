@@ -5,6 +5,8 @@ use hdrhistogram::serialization::{Deserializer, Serializer, V2Serializer};
 use masseter_runtime::clock::SECOND_NS;
 use serde::Serialize;
 
+use crate::statistic::Statistic;
+
 /// Below this many samples the 99.9th percentile rests on fewer than ten of them and is not given.
 const SAMPLES_FOR_P999: u64 = 10_000;
 /// End of the first bucket of a plot, ns.
@@ -191,13 +193,8 @@ const FEWEST_SECONDS: usize = 3;
 
 /// Standard error of the mean of one figure's values in each second of a run; none with too few seconds.
 pub(super) fn standard_error(seconds: &[f64]) -> Option<f64> {
-    if seconds.len() < FEWEST_SECONDS {
-        return None;
-    }
-    let n = seconds.len() as f64;
-    let mean = seconds.iter().sum::<f64>() / n;
-    let squares: f64 = seconds.iter().map(|value| (value - mean).powi(2)).sum();
-    Some((squares / (n - 1.0) / n).sqrt())
+    let sd = Statistic::of(seconds).sd.filter(|_| seconds.len() >= FEWEST_SECONDS)?;
+    Some(sd / (seconds.len() as f64).sqrt())
 }
 
 #[cfg(test)]

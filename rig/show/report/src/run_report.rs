@@ -152,7 +152,9 @@ fn show_and_write(
     reserved: Option<File>,
 ) -> Result<(Verdict, Result<(), WriteError>), Failure> {
     let verdict = Verdict::new(manifest, figures);
-    let documents = Documents::new(manifest, figures, &verdict)?;
+    let summary = summary_json(&verdict, figures).context("cannot write the summary").incomplete()?;
+    let page = page::html(manifest, figures, &verdict, None).context("cannot write the page").incomplete()?;
+    let junit = junit::xml(manifest, figures, &verdict).context("cannot write junit.xml").incomplete()?;
     let shown = match shown {
         None => Ok(()),
         Some((Format::Human, detail)) => {
@@ -167,47 +169,31 @@ fn show_and_write(
             };
             result_with_tones(&text, &table::TONES)
         }
-        Some((Format::Json, _)) => result(&documents.summary),
+        Some((Format::Json, _)) => result(&summary),
     };
     drop(reserved);
-    let written = documents.write(folder, figures, logged);
+    let others = [("junit.xml", junit), ("report.html", page)];
+    let written = write_files(folder, figures, logged, &summary, others);
     shown.incomplete()?;
     Ok((verdict, written))
 }
 
-/// The documents of a report.
-struct Documents {
-    summary: String,
-    page: String,
-    junit: String,
-}
-
-impl Documents {
-    fn new(manifest: &Manifest, figures: &Figures, verdict: &Verdict) -> Result<Self, Failure> {
-        Ok(Self {
-            summary: summary_json(verdict, figures).context("cannot write the summary").incomplete()?,
-            page: page::html(manifest, figures, verdict, None)
-                .context("cannot write the page")
-                .incomplete()?,
-            junit: junit::xml(manifest, figures, verdict).context("cannot write junit.xml").incomplete()?,
-        })
-    }
-
-    /// Writes them and the logs; `logged` is whether the logs of the buses were written.
-    fn write(
-        self,
-        folder: &RunFolder,
-        figures: &Figures,
-        logged: Result<(), WriteError>,
-    ) -> Result<(), WriteError> {
-        fs::write(folder.summary(), self.summary).map_err(WriteError::for_file(&folder.summary()))?;
-        logged?;
-        write_histograms(&folder.file("hist"), &figures.intervals)?;
-        write_events(&folder.file("events.jsonl"), &figures.events)?;
-        [(folder.file("junit.xml"), self.junit), (folder.file("report.html"), self.page)]
-            .into_iter()
-            .try_for_each(|(path, text)| fs::write(&path, text).map_err(WriteError::for_file(&path)))
-    }
+/// Writes the summary, the logs and the other documents; `logged` is whether the logs of the buses were written.
+fn write_files(
+    folder: &RunFolder,
+    figures: &Figures,
+    logged: Result<(), WriteError>,
+    summary: &str,
+    others: [(&str, String); 2],
+) -> Result<(), WriteError> {
+    fs::write(folder.summary(), summary).map_err(WriteError::for_file(&folder.summary()))?;
+    logged?;
+    write_histograms(&folder.file("hist"), &figures.intervals)?;
+    write_events(&folder.file("events.jsonl"), &figures.events)?;
+    others
+        .into_iter()
+        .map(|(name, text)| (folder.file(name), text))
+        .try_for_each(|(path, text)| fs::write(&path, text).map_err(WriteError::for_file(&path)))
 }
 
 /// Version of the summary's form.

@@ -14,26 +14,6 @@ use crate::text::{or_dash, table};
 /// Version of the form as JSON.
 pub(super) const FORM: u32 = 1;
 
-/// A field that differs.
-#[derive(Debug, Serialize)]
-pub(super) struct FieldDifference {
-    pub(super) topic: &'static str,
-    /// The time of the first difference since the motion began, s.
-    pub(super) motion_s: Option<f64>,
-    #[serde(flatten)]
-    pub(super) growth: FieldGrowth,
-}
-
-/// Messages without a partner.
-#[derive(Debug, Serialize)]
-pub(super) struct OneSided {
-    pub(super) topic: &'static str,
-    /// Whether the second stream has them.
-    pub(super) only_in_b: bool,
-    #[serde(flatten)]
-    pub(super) missing: Missing,
-}
-
 /// A topic whose digest differs.
 #[derive(Debug, Serialize)]
 pub(super) struct DigestDifference {
@@ -49,8 +29,8 @@ pub struct Differences {
     /// Messages that had a partner.
     pub(super) messages: u64,
     /// By their first cycle, then in the order of a cycle.
-    pub(super) fields: Vec<FieldDifference>,
-    pub(super) one_sided: Vec<OneSided>,
+    pub(super) fields: Vec<FieldGrowth>,
+    pub(super) one_sided: Vec<Missing>,
     /// Topics whose messages have other fields.
     pub(super) redefined: Vec<&'static str>,
     /// Topics that one side has not recorded, which are not compared.
@@ -88,11 +68,11 @@ impl Differences {
                 "in cycle",
                 "at the end",
             ];
-            let rows = self.fields.iter().map(|FieldDifference { topic, motion_s, growth }| {
+            let rows = self.fields.iter().map(|growth| {
                 [
-                    format!("{topic}.{}", growth.name()),
+                    growth.name(),
                     growth.first_cycle.to_string(),
-                    or_dash(*motion_s, |motion_s| format!("{motion_s:.3}")),
+                    or_dash(growth.motion_s, |motion_s| format!("{motion_s:.3}")),
                     growth.sized(growth.first),
                     or_dash(growth.beyond_one_cycle, |cycle| cycle.to_string()),
                     growth.sized(growth.largest),
@@ -102,8 +82,7 @@ impl Differences {
             });
             text = text + "\n" + &table(WIDTHS, heads, rows);
         }
-        for OneSided { topic, only_in_b, missing } in &self.one_sided {
-            let Missing { first_cycle, messages } = missing;
+        for Missing { topic, only_in_b, first_cycle, messages } in &self.one_sided {
             let name = names[usize::from(*only_in_b)];
             let _ =
                 writeln!(text, "only in {name}: {messages} on '{topic}', the first in cycle {first_cycle}");
@@ -126,21 +105,19 @@ impl Differences {
         if self.is_equal {
             return format!("EQUAL: {} messages, bit by bit", self.messages);
         }
-        let field = self.fields.first().map(|field| {
-            let [in_a, in_b] = &field.growth.values;
-            let size = field.growth.first.map(|size| format!(" ({} apart)", field.growth.sized(Some(size))));
+        let field = self.fields.first().map(|growth| {
+            let [in_a, in_b] = &growth.values;
+            let size = growth.first.map(|size| format!(" ({} apart)", growth.sized(Some(size))));
             let size = size.unwrap_or_default();
-            let what =
-                format!("{}.{} is {in_a} in {a}, {in_b} in {b}{size}", field.topic, field.growth.name());
-            (field.growth.first_cycle, what)
+            (growth.first_cycle, format!("{} is {in_a} in {a}, {in_b} in {b}{size}", growth.name()))
         });
-        let one_sided = self.one_sided.first().map(|OneSided { topic, only_in_b, missing }| {
+        let one_sided = self.one_sided.first().map(|Missing { topic, only_in_b, first_cycle, .. }| {
             let name = if *only_in_b { b } else { a };
-            (missing.first_cycle, format!("only {name} has a message on '{topic}'"))
+            (*first_cycle, format!("only {name} has a message on '{topic}'"))
         });
         let digest = self.digests.first().map(|DigestDifference { topic, first_cycle }| {
             let what = format!("topic '{topic}' by its digest");
-            let whole = self.fields.first().filter(|field| field.growth.first_cycle > *first_cycle);
+            let whole = self.fields.first().filter(|field| field.first_cycle > *first_cycle);
             let whole =
                 whole.zip(field.as_ref()).map(|(_, (cycle, what))| format!("; in cycle {cycle}, {what}"));
             (*first_cycle, what + &whole.unwrap_or_default())

@@ -45,6 +45,9 @@ impl LaneKey {
 /// Messages that one side alone has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub(super) struct Missing {
+    pub(super) topic: &'static str,
+    /// Whether the second side has them.
+    pub(super) only_in_b: bool,
     pub(super) first_cycle: u64,
     pub(super) messages: u64,
 }
@@ -83,7 +86,7 @@ impl Lane {
                     if let Some(columns) = columns
                         && bodies[0].body() != bodies[1].body()
                     {
-                        self.compare(columns, cycle, bodies.each_ref().map(Recorded::body), &is_compared);
+                        self.compare(columns, cycle, bodies.each_ref(), &is_compared);
                     }
                 }
             }
@@ -94,9 +97,10 @@ impl Lane {
         &mut self,
         columns: &Columns,
         cycle: u64,
-        bodies: [&[u8]; 2],
+        messages: [&Recorded; 2],
         is_compared: impl Fn(&str) -> bool,
     ) {
+        let (topic, bodies) = (messages[0].topic().name(), messages.map(Recorded::body));
         for (place, field) in columns.fields().iter().enumerate() {
             let [a, b] = bodies.map(|body| field.bytes(body));
             if a != b && is_compared(field.name()) {
@@ -104,7 +108,10 @@ impl Lane {
                 let (unit, size) = difference(field, &numbers);
                 let growth = self.growths.entry(place);
                 growth
-                    .or_insert_with(|| FieldGrowth::new(field, unit, cycle, &numbers))
+                    .or_insert_with(|| FieldGrowth {
+                        topic,
+                        ..FieldGrowth::new(field, unit, cycle, &numbers)
+                    })
                     .add_difference(cycle, size);
             }
         }
@@ -115,14 +122,16 @@ impl Lane {
             let values = tails.map(|tail| data_encoding::HEXUPPER.encode(tail));
             let growth = self.growths.entry(columns.fields().len());
             growth
-                .or_insert_with(|| FieldGrowth::of(tail.name(), "", cycle, values))
+                .or_insert_with(|| FieldGrowth { topic, ..FieldGrowth::of(tail.name(), "", cycle, values) })
                 .add_difference(cycle, None);
         }
     }
 
     fn drop_front(&mut self, side: usize) {
-        if let Some((cycle, _)) = self.waiting[side].pop_front() {
-            self.missing[side].get_or_insert(Missing { first_cycle: cycle, messages: 0 }).messages += 1;
+        if let Some((first_cycle, message)) = self.waiting[side].pop_front() {
+            let (topic, only_in_b) = (message.topic().name(), side == 1);
+            let none = Missing { topic, only_in_b, first_cycle, messages: 0 };
+            self.missing[side].get_or_insert(none).messages += 1;
         }
     }
 
@@ -145,6 +154,9 @@ const SMALL: f64 = 1.0;
 /// The differences of one field.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub(super) struct FieldGrowth {
+    pub(super) topic: &'static str,
+    /// The time of the first difference since the motion began, s.
+    pub(super) motion_s: Option<f64>,
     pub(super) field: String,
     /// The unit of all sizes; empty where the field has none.
     unit: &'static str,
@@ -205,9 +217,10 @@ impl FieldGrowth {
         self
     }
 
-    /// The field with its element: `target_m[3]`.
+    /// The field with its topic and element: `command.target_m[3]`.
     pub(super) fn name(&self) -> String {
-        self.element.map_or_else(|| self.field.clone(), |element| format!("{}[{element}]", self.field))
+        let element = self.element.map_or_else(String::new, |element| format!("[{element}]"));
+        format!("{}.{}{element}", self.topic, self.field)
     }
 
     /// A size with its unit.

@@ -13,7 +13,7 @@ use anyhow::{Context, ensure};
 use masseter_recording::{Columns, Digester, Digests, Reader, Recorded, Topic, is_kept, recording_at};
 use masseter_terminal::{Exit, Format, result};
 
-use self::differences::{DigestDifference, FORM, FieldDifference, MotionClock, OneSided};
+use self::differences::{DigestDifference, FORM, MotionClock};
 use self::lane::{Lane, LaneKey};
 
 pub use differences::{Compared, Differences};
@@ -97,24 +97,21 @@ impl Comparison {
         let (mut messages, mut fields, mut one_sided, mut redefined) =
             (0, Vec::new(), Vec::new(), Vec::new());
         for (key, lane) in lanes {
-            let topic = key.topic().name();
             messages += lane.messages;
             if lane.messages > 0 && !columns.contains_key(&key.topic()) {
-                redefined.push(topic);
+                redefined.push(key.topic().name());
             }
-            let (growths, missing) = lane.into_differences();
-            fields.extend(growths.into_iter().map(|growth| {
-                let motion_s = clock.motion_s(growth.first_cycle);
-                FieldDifference { topic, motion_s, growth }
-            }));
-            for (missing, only_in_b) in missing.into_iter().zip([false, true]) {
-                one_sided.extend(missing.map(|missing| OneSided { topic, only_in_b, missing }));
+            let (mut growths, missing) = lane.into_differences();
+            for growth in &mut growths {
+                growth.motion_s = clock.motion_s(growth.first_cycle);
             }
+            fields.append(&mut growths);
+            one_sided.extend(missing.into_iter().flatten());
         }
         // Each source of a topic has a lane.
         redefined.dedup();
-        fields.sort_by_key(|field| field.growth.first_cycle);
-        one_sided.sort_by_key(|messages| messages.missing.first_cycle);
+        fields.sort_by_key(|field| field.first_cycle);
+        one_sided.sort_by_key(|missing| missing.first_cycle);
         Differences {
             form: FORM,
             is_equal: fields.is_empty() && one_sided.is_empty() && redefined.is_empty() && digests.is_empty(),
