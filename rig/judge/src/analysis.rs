@@ -5,28 +5,22 @@
 use masseter_recording::{Damage, ProcessFault, Recorded, RunUsage};
 use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind, Source};
 use masseter_runtime::messages::tap::{self, TapError};
-use masseter_runtime::messages::{Event, FrameTap, Message, Reading, State, Truth};
+use masseter_runtime::messages::{Event, FrameTap, Message, Reading, State};
 use masseter_runtime::named::{Declared, PlayedMotion};
 use masseter_scenario::{ChecksConfig, FaultKindConfig, Scenario};
 
-use crate::bite_estimate::BiteEstimateWatch;
-use crate::declared_faults::FaultWatch;
 use crate::events::{Code, EventRecord};
-use crate::figures::Figures;
-use crate::loads::AxisWatch;
 use crate::lost_cycles::{Disturbance, Freshness, OutageWatch, ScenarioStalls};
 use crate::messages::{Digest, ParameterFigures, SequenceCheck, SignalFigures};
-use crate::overruns::LoopSamples;
 use crate::played::{MotionFigures, PlayedWatch, StopWatch};
-use crate::poses::is_running;
-use crate::recorded::RecordedWatch;
-use crate::requirements::Requirements;
-use crate::response::Responses;
-use crate::shown::Shown;
 use crate::signals::{Pace, Sample, Timeline};
 use crate::skips::{Counters, OverrunAttribution, Skips, longest_overruns};
-use crate::standstill::StandstillWatch;
 use crate::tracking::{PoseSource, Tracking};
+use crate::{
+    bite_estimate::BiteEstimateWatch, declared_faults::FaultWatch, figures::Figures, loads::AxisWatch,
+    overruns::LoopSamples, poses::is_running, recorded::RecordedWatch, requirements::Requirements,
+    response::Responses, shown::Shown, standstill::StandstillWatch,
+};
 
 /// Computes the [`Figures`] of a run from its messages, in their order in the recording.
 ///
@@ -168,7 +162,11 @@ impl Analysis {
             }
             Recorded::Reading(reading) => self.apply_reading(reading),
             Recorded::State(state) => self.apply_state(state),
-            Recorded::Truth(truth) => self.apply_truth(truth),
+            Recorded::Truth(truth) => {
+                let most_n = self.figures.bite_force_max_n.iter_mut();
+                most_n.for_each(|most_n| *most_n = most_n.max(truth.bite_force_n));
+                self.shown.iter_mut().for_each(|shown| shown.apply_truth(truth));
+            }
             Recorded::Contact(contact) => {
                 let since_ns = self.shown.as_mut().map(|shown| shown.over_time.since(contact.sampled_ns));
                 self.figures.contact.get_or_insert_default().add_contact(contact, since_ns);
@@ -247,11 +245,6 @@ impl Analysis {
         }
         self.last_due_ns = state.due_ns;
         self.stop.apply_state(state);
-    }
-
-    fn apply_truth(&mut self, truth: &Truth) {
-        self.figures.bite_force_max_n.iter_mut().for_each(|most_n| *most_n = most_n.max(truth.bite_force_n));
-        self.shown.iter_mut().for_each(|shown| shown.apply_truth(truth));
     }
 
     /// Takes the next cycle in the order of time.

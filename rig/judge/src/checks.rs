@@ -9,18 +9,14 @@ use masseter_runtime::messages::codes::{Cause, ControllerState};
 use masseter_runtime::{named::PlayedMotion, schedule::CycleSchedule};
 use masseter_scenario::{Dimension, ExpectedVerdict, StimulusConfig, wording::counted};
 
-use crate::breach::Breach;
 use crate::check::{Check, CheckFigures, CheckResult, Subject, faults, tracking};
-use crate::events::EventRecord;
-use crate::figures::Figures;
-use crate::played::MotionFigures;
-use crate::requirements::RequirementFigures;
 use crate::response::{BusResponse, ResponseFigures};
-use crate::shortfall::Shortfall;
-use crate::skips::SkipFigures;
-use crate::standstill::standstill;
 use crate::timing::{Timing, TimingWord};
-use crate::tracking::TrackingFigures;
+use crate::{
+    breach::Breach, events::EventRecord, figures::Figures, played::MotionFigures,
+    requirements::RequirementFigures, shortfall::Shortfall, skips::SkipFigures, standstill::standstill,
+    tracking::TrackingFigures,
+};
 
 /// None in a run that ended before its first cycle.
 pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) -> Vec<Check> {

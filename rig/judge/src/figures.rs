@@ -7,26 +7,19 @@ use masseter_recording::Damage;
 use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind};
 use serde::Serialize;
 
-use crate::bite_estimate::BiteEstimateFigures;
-use crate::breach::PathBreach;
-use crate::declared_faults::FaultFigures;
 use crate::events::{Code, EventRecord};
-use crate::jaw_cycles::JawCycleFigures;
 use crate::loads::{AxisFigures, ContactFigures};
-use crate::longest_cycles::WorstCycle;
 use crate::lost_cycles::{Outage, ReadingFigures};
-use crate::measured::IntervalFigures;
 use crate::messages::{ParameterFigures, SignalFigures, TopicFigures};
-use crate::order::Disorder;
-use crate::over_time::OverTime;
-use crate::overruns::Overrun;
 use crate::played::{MotionFigures, StoppedBy};
-use crate::recorded::RecordedFigures;
-use crate::requirements::RequirementFigures;
-use crate::response::BusResponse;
 use crate::skips::{OverrunAttribution, SkipFigures};
-use crate::standstill::StandstillFigures;
 use crate::tracking::{TrackingFigures, TrackingSample};
+use crate::{
+    bite_estimate::BiteEstimateFigures, breach::PathBreach, declared_faults::FaultFigures,
+    jaw_cycles::JawCycleFigures, longest_cycles::WorstCycle, measured::IntervalFigures, over_time::OverTime,
+    overruns::Overrun, recorded::RecordedFigures, reference::Disorder, requirements::RequirementFigures,
+    response::BusResponse, standstill::StandstillFigures,
+};
 
 /// The figures of a run. As JSON: `figures` of `summary.json`.
 #[derive(Debug, Clone, Default, Serialize)]

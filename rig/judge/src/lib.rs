@@ -3,7 +3,6 @@
 //! [`Analysis`] takes the messages and returns [`Figures`]; [`Verdict`] judges them. Nothing here reads or writes a file:
 //! see the crates `masseter-recording` and `masseter-report`.
 
-mod ahead;
 mod analysis;
 mod bite_estimate;
 mod breach;
@@ -21,7 +20,6 @@ mod lost_cycles;
 mod measured;
 mod messages;
 mod next_step;
-mod order;
 mod outcome;
 mod over_time;
 mod overruns;
@@ -62,7 +60,6 @@ pub use lost_cycles::{Outage, ReadingFigures};
 pub use measured::{IntervalFigures, Seconds, resolution_ns};
 pub use messages::{ParameterFigures, SequenceCheck, SignalFigures, TopicFigures};
 pub use next_step::NextStep;
-pub use order::Disorder;
 pub use outcome::missing_part;
 pub use over_time::OverTime;
 pub use overruns::{LoopCounts, Overrun, OverrunCause};
@@ -70,6 +67,7 @@ pub use played::{MotionFigures, StoppedBy};
 pub use poses::MOVING;
 pub use pressure::{Bearing, PressedTooth, Pressure};
 pub use recorded::{RecordedError, RecordedFigures, RecordedWatch};
+pub use reference::Disorder;
 pub use response::{BusResponse, ResponseFigures};
 pub use series::{Band, Curve};
 pub use skips::{OverrunAttribution, SkipFigures};

@@ -8,15 +8,16 @@
 //! SYNC and the machine's lost cycles cost. Before the motion, and in an own motion, the controller's desired pose counts. After the motion the last pose
 //! stays. Where the machine loses cycles while the rate of the motion changes, the pose is not exactly the controller's.
 
+use std::fmt::{self, Display, Formatter};
+
 use masseter_controller::{playback::Playback, trajectory::Trajectory};
-use masseter_model::geometry::{Mechanism, Pose, Vec3};
-use masseter_runtime::messages::codes::Cause;
+use masseter_model::geometry::{AXES, Mechanism, Pose, Vec3};
+use masseter_runtime::messages::codes::{Cause, ControllerState};
 use masseter_runtime::messages::{Parameters, Reading, State, pose_fields};
 use masseter_runtime::named::{Declared, PlayedMotion};
 use masseter_scenario::Scenario;
 
-use crate::order::{Disorder, StateOrder};
-use crate::poses::{desired_pose, is_moving, is_running};
+use crate::poses::{MOVING, are_enabled, desired_pose, is_moving, is_running};
 use crate::{events::EventRecord, jaw_cycles::MotionSpeed};
 
 /// What the messages of a sample say of the motion.
@@ -261,6 +262,95 @@ fn playback(scenario: &Scenario) -> Option<Playback> {
     let mechanism = Mechanism::new(&scenario.mechanism).ok()?;
     let motion = Trajectory::of_scenario(scenario, &mechanism).ok()?;
     Some(Playback::of_scenario(scenario, &mechanism, motion))
+}
+
+/// Cycles of the lead-in beside the move to the first pose.
+const MORE_CYCLES: f64 = 3.0;
+
+/// What is out of order in the states of a controller.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Disorder {
+    /// It was never in the state `running`.
+    NeverBegan,
+    /// It was in the state `running` before all drives were enabled.
+    BeforeDrives,
+    /// After the drives were enabled it went back to an earlier state.
+    Back {
+        /// The state before.
+        from: ControllerState,
+        /// The earlier state.
+        to: ControllerState,
+    },
+}
+
+impl Display for Disorder {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NeverBegan => {
+                f.write_str("the controller never began the motion: it was never in the state running")
+            }
+            Self::BeforeDrives => {
+                f.write_str("the controller began the motion before all drives were enabled")
+            }
+            Self::Back { from, to } => write!(f, "the controller went back from the state {from} to {to}"),
+        }
+    }
+}
+
+/// Follows the states, cycle by cycle.
+#[derive(Debug, Clone, Default)]
+struct StateOrder {
+    /// An own motion may hold and go on.
+    is_own: bool,
+    lead_in_cycles: u64,
+    /// Cycles with a complete reading of enabled drives.
+    ready_cycles: u64,
+    were_enabled: bool,
+    state: Option<ControllerState>,
+    has_run: bool,
+    /// The first, and when it was, ns of the run's clock.
+    disorder: Option<(Disorder, Option<u64>)>,
+}
+
+impl StateOrder {
+    fn new(scenario: &Scenario, declared: &Declared) -> Self {
+        let lead_in_cycles = (scenario.controller.ease_s / scenario.period_s() + MORE_CYCLES).ceil() as u64;
+        Self { is_own: declared.motion == PlayedMotion::Own, lead_in_cycles, ..Self::default() }
+    }
+
+    /// Takes a cycle. `is_counted`: whether no loop lost it.
+    fn advance(&mut self, state: Option<u32>, reading: Option<&Reading>, is_counted: bool) {
+        let are_enabled = reading.map(are_enabled);
+        self.were_enabled |= are_enabled == Some(true);
+        let is_complete =
+            are_enabled == Some(true) && reading.is_some_and(|of| of.fresh_axes == (1 << AXES) - 1);
+        self.ready_cycles += u64::from(is_counted && is_complete);
+        let Some(to) = state.and_then(|code| ControllerState::try_from(code).ok()) else { return };
+        let from = self.state.replace(to).unwrap_or(to);
+        self.has_run |= to == ControllerState::Running;
+        let is_before_drives = to == ControllerState::Running && !self.were_enabled && are_enabled.is_some();
+        let is_early = |state: ControllerState| state.code() < ControllerState::Easing.code();
+        let is_pause = self.is_own && MOVING.contains(&from) && MOVING.contains(&to);
+        let is_back = to.code() < from.code() && !is_early(from) && !is_pause;
+        let found = is_back.then_some(Disorder::Back { from, to });
+        let found = if is_before_drives { Some(Disorder::BeforeDrives) } else { found };
+        self.disorder = self.disorder.or(found.map(|found| (found, reading.map(|of| of.sampled_ns))));
+    }
+
+    /// Whether the controller is in a state before the motion.
+    fn is_before_motion(&self) -> bool {
+        !self.has_run && self.state.is_some_and(|state| state.code() <= ControllerState::Easing.code())
+    }
+
+    /// Whether the lead-in is over, and the controller has not begun its motion.
+    fn is_overdue(&self) -> bool {
+        self.is_before_motion() && self.ready_cycles > self.lead_in_cycles
+    }
+
+    /// What is out of order first, and when.
+    fn disorder(&self) -> Option<(Disorder, Option<u64>)> {
+        self.disorder.or((!self.has_run).then_some((Disorder::NeverBegan, None)))
+    }
 }
 
 #[cfg(test)]

@@ -9,7 +9,8 @@ use masseter_runtime::{control::Deadline, named::PlayedMotion};
 use masseter_scenario::ExpectedVerdict;
 
 use crate::{
-    breach::Breach, check::Check, check::CheckResult, figures::Figures, order::Disorder, played::StoppedBy,
+    breach::Breach, check::Check, check::CheckResult, figures::Figures, played::StoppedBy,
+    reference::Disorder,
 };
 
 /// Share of the motion that the jaw must go.

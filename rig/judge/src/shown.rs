@@ -4,14 +4,13 @@ use masseter_runtime::messages::codes::NO_DRIVE_STATE;
 use masseter_runtime::messages::{Command, Reading, State, Truth};
 use masseter_scenario::Scenario;
 
-use crate::figures::Figures;
-use crate::intervals::Intervals;
 use crate::jaw_cycles::{JawCycles, MotionSpeed};
-use crate::longest_cycles::LongestCycles;
 use crate::over_time::{CONTROLLER, OverTime, PLANT, Place};
 use crate::poses::{estimated_pose, is_running, true_pose};
-use crate::signals::CycleMessages;
-use crate::tracking::PathSample;
+use crate::{
+    figures::Figures, intervals::Intervals, longest_cycles::LongestCycles, signals::CycleMessages,
+    tracking::PathSample,
+};
 
 /// Collects them.
 #[derive(Debug, Clone)]
