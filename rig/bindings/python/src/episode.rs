@@ -80,8 +80,7 @@ struct Now {
 
 /// An instant of an episode, to go back to.
 pub(crate) struct Branch {
-    run: RunSnapshot,
-    watch: Watch,
+    run: RunSnapshot<Watch>,
     exchange: Exchange,
     exchanged: Exchanged,
     now: Now,
@@ -216,9 +215,9 @@ impl Episode {
     }
 
     pub(crate) fn branch(&self) -> anyhow::Result<Branch> {
-        let (run, watch) = (self.run.snapshot()?, self.run.sink().clone());
+        let run = self.run.snapshot()?;
         let (exchange, exchanged) = (self.exchange.clone(), self.exchange.get());
-        Ok(Branch { run, watch, exchange, exchanged, now: self.now.clone() })
+        Ok(Branch { run, exchange, exchanged, now: self.now.clone() })
     }
 
     pub(crate) fn restore(&mut self, branch: &Branch) -> anyhow::Result<()> {
@@ -227,7 +226,6 @@ impl Episode {
             "the snapshot is of another environment; take it from this one"
         );
         self.run.restore(&branch.run)?;
-        self.run.sink_mut().clone_from(&branch.watch);
         self.exchange.set(&branch.exchanged);
         self.now.clone_from(&branch.now);
         Ok(())

@@ -24,6 +24,7 @@ fn main() {
 }
 
 /// Takes the messages and does nothing with them.
+#[derive(Clone)]
 struct Nowhere;
 
 impl Sink for Nowhere {

@@ -4,27 +4,15 @@
 
 use masseter_controller::process::BuildController;
 use masseter_judge::{Analysis, Figures};
-use masseter_plan::RunPlan;
-use masseter_plant::PlantError;
-use masseter_recording::Manifest;
 use masseter_runtime::named::{Declared, NameError};
 use masseter_runtime::{control::NoBranch, messages::tap::TapError};
 
 use crate::log::Stream;
-use crate::run::{Control, Requests, RestoreError, Run, RunSnapshot, Without, built};
+use crate::run::{Requests, RestoreError, Run, RunSnapshot, Without, built};
 
 /// Why a branch cannot be played.
 #[derive(Debug, thiserror::Error)]
 pub enum BranchError {
-    /// The plant failed.
-    #[error(transparent)]
-    Plant(#[from] PlantError),
-    /// The controller cannot be copied.
-    #[error(transparent)]
-    Controller(#[from] NoBranch),
-    /// The run cannot go back.
-    #[error(transparent)]
-    Restore(#[from] RestoreError),
     /// The controller has no such parameter.
     #[error(transparent)]
     Name(#[from] NameError),
@@ -34,17 +22,13 @@ pub enum BranchError {
 }
 
 /// A run by a controller of the rig, at an instant between two cycles.
-pub struct Branches {
-    run: Run<Stream>,
-    declared: Declared,
-}
+pub struct Branches(Run<Stream>);
 
 /// An instant of a run with all that came before.
 pub struct Mark {
     /// The number of the last cycle before that instant.
     pub cycle: u64,
-    snapshot: RunSnapshot,
-    stream: Stream,
+    snapshot: RunSnapshot<Stream>,
 }
 
 impl Branches {
@@ -52,27 +36,25 @@ impl Branches {
     ///
     /// # Errors
     /// When the scenario does not fit the plant, or what the controller declares.
-    pub fn new(plan: &RunPlan, build: BuildController) -> anyhow::Result<Self> {
-        let mut declared = Declared::default();
-        let control = Control::new(plan, built(plan, build), &mut declared)?;
-        let stream = Stream::new(Analysis::without_report(&plan.scenario, &declared));
-        Ok(Self { run: Run::of_control(plan, control, stream)?, declared })
+    pub fn new(plan: &masseter_plan::RunPlan, build: BuildController) -> anyhow::Result<Self> {
+        let stream = |declared: &_| Ok(Stream::new(Analysis::without_report(&plan.scenario, declared)));
+        Run::with_sink(plan, built(plan, build), stream).map(Self)
     }
 
     /// What the controller declares.
     pub fn declared(&self) -> &Declared {
-        &self.declared
+        self.0.declared()
     }
 
     /// Plays until this many cycles are over, or the controller has ended; returns how many are.
     ///
     /// # Errors
     /// When the plant fails.
-    pub fn advance_to(&mut self, cycle: u64) -> Result<u64, PlantError> {
-        while self.run.cycle() < cycle && !self.run.has_ended() {
-            self.run.play_cycle()?;
+    pub fn advance_to(&mut self, cycle: u64) -> Result<u64, masseter_plant::PlantError> {
+        while self.0.cycle() < cycle && !self.0.has_ended() {
+            self.0.play_cycle()?;
         }
-        Ok(self.run.cycle())
+        Ok(self.0.cycle())
     }
 
     /// This instant.
@@ -80,8 +62,7 @@ impl Branches {
     /// # Errors
     /// Where the controller cannot be copied.
     pub fn mark(&self) -> Result<Mark, NoBranch> {
-        let (snapshot, stream) = (self.run.snapshot()?, self.run.sink().clone());
-        Ok(Mark { cycle: self.run.cycle(), snapshot, stream })
+        Ok(Mark { cycle: self.0.cycle(), snapshot: self.0.snapshot()? })
     }
 
     /// Goes to an instant.
@@ -89,9 +70,7 @@ impl Branches {
     /// # Errors
     /// Where the instant is one of another scenario or seed.
     pub fn go_to(&mut self, mark: &Mark) -> Result<(), RestoreError> {
-        self.run.restore(&mark.snapshot)?;
-        self.run.sink_mut().clone_from(&mark.stream);
-        Ok(())
+        self.0.restore(&mark.snapshot)
     }
 
     /// Plays from here to the end, without this, and stays there. Enters the ending into the manifest.
@@ -101,14 +80,14 @@ impl Branches {
     pub fn end(
         &mut self,
         without: Option<&Without>,
-        manifest: &mut Manifest,
+        manifest: &mut masseter_recording::Manifest,
         interrupts: &dyn Requests,
     ) -> Result<Figures, BranchError> {
         if let Some(without) = without {
-            self.run.go_without(without)?;
+            self.0.go_without(without)?;
         }
-        manifest.declared.clone_from(&self.declared);
-        manifest.ending = self.run.play(interrupts);
-        Ok(self.run.sink().clone().figures()?)
+        manifest.declared.clone_from(self.declared());
+        manifest.ending = self.0.play(interrupts);
+        Ok(self.0.sink().clone().figures()?)
     }
 }

@@ -16,12 +16,8 @@ use masseter_controller::process::BuildController;
 use masseter_judge::{Analysis, Figures};
 use masseter_plan::RunPlan;
 use masseter_recording::{Backlog, Ending, Manifest, Pace, Recorder, RunFolder, Scene};
-use masseter_runtime::named::Declared;
-use masseter_scenario::Scenario;
-use masseter_terminal::status;
 
-use log::Stream;
-use run::{Control, built};
+use run::built;
 
 pub use branches::{BranchError, Branches, Mark};
 pub use log::{Log, LoggedPorts, Sink};
@@ -30,7 +26,7 @@ pub use run::{Requests, RestoreError, Run, RunSnapshot, Uninterrupted, Without};
 pub use snapshot::{OtherScenario, Snapshot, SnapshotError, SnapshotProblem};
 
 /// Makes the analysis of a run: with everything that a report shows, or with what a verdict needs alone.
-pub type StartAnalysis = fn(&Scenario, &Declared) -> Analysis;
+pub type StartAnalysis = fn(&masseter_scenario::Scenario, &masseter_runtime::named::Declared) -> Analysis;
 
 /// Plays a run and records it. The run ends as one with processes does, also when the user stops it. Enters the
 /// ending and what the controller declares into the manifest.
@@ -41,14 +37,16 @@ pub fn record(
     manifest: &mut Manifest,
     interrupts: &dyn Requests,
 ) -> anyhow::Result<()> {
-    let control = Control::new(plan, built(plan, build), &mut manifest.declared)?;
-    let scene = Scene::new(&plan.mechanism, &plan.scenario.jaw);
-    let mut recorder = Recorder::of_run(folder, scene)?;
-    recorder.declare(&manifest.declared)?;
-    let mut run = Run::of_control(plan, control, Backlog::start(recorder, Pace::Virtual))?;
+    let backlog = |declared: &_| {
+        let mut recorder = Recorder::of_run(folder, Scene::new(&plan.mechanism, &plan.scenario.jaw))?;
+        recorder.declare(declared)?;
+        Ok(Backlog::start(recorder, Pace::Virtual))
+    };
+    let mut run = Run::with_sink(plan, built(plan, build), backlog)?;
+    manifest.declared.clone_from(run.declared());
     manifest.ending = run.play(interrupts);
     if let Some(loss) = run.into_sink().finish().loss() {
-        status!("masseter: {loss}; the run ends here");
+        masseter_terminal::status!("masseter: {loss}; the run ends here");
         manifest.ending = match &manifest.ending {
             died @ Ending::Died { .. } => died.clone(),
             _ => Ending::RecordingFailed,
@@ -66,9 +64,9 @@ pub fn analyse(
     manifest: &mut Manifest,
     interrupts: &dyn Requests,
 ) -> anyhow::Result<Figures> {
-    let control = Control::new(plan, built(plan, build), &mut manifest.declared)?;
-    let stream = Stream::new(start(&plan.scenario, &manifest.declared));
-    let mut run = Run::of_control(plan, control, stream)?;
+    let stream = |declared: &_| Ok(log::Stream::new(start(&plan.scenario, declared)));
+    let mut run = Run::with_sink(plan, built(plan, build), stream)?;
+    manifest.declared.clone_from(run.declared());
     manifest.ending = run.play(interrupts);
     run.into_sink().figures().context("a message on topic 'frame' holds no CAN frame")
 }

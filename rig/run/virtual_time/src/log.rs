@@ -6,7 +6,6 @@
 use std::{cell::Cell, convert::Infallible};
 
 use masseter_judge::{Analysis, Figures, Watch, signals::CycleMessages};
-use masseter_plant::core::PlantCore;
 use masseter_recording::{Backlog, Recorded};
 use masseter_runtime::messages::{self, Command, Event, Message, Parameters, Reading, Signals};
 use masseter_runtime::{control::ControllerPorts, messages::tap::TapError, realtime::Wake};
@@ -156,7 +155,7 @@ impl<S: Sink> Log<S> {
     }
 
     /// Hands on the frames and events that the plant has kept since the last call.
-    pub(crate) fn drain(&mut self, plant: &mut PlantCore, now_ns: u64) {
+    pub(crate) fn drain(&mut self, plant: &mut masseter_plant::core::PlantCore, now_ns: u64) {
         for frame in plant.drain_frames() {
             self.record(Publisher::Frame, now_ns, |message| *message = frame);
         }

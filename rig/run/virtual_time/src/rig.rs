@@ -12,10 +12,7 @@ mod tests;
 use std::{error::Error, path::Path, sync::Arc};
 
 use masseter_judge::signals::{Registry, UnknownSignal};
-use masseter_plan::RunPlan;
-use masseter_plant::PlantError;
 use masseter_runtime::messages::{Command, Event, Reading, Truth};
-use masseter_runtime::named::Declared;
 use masseter_scenario::Scenario;
 
 use crate::snapshot::{OtherScenario, Snapshot, SnapshotError};
@@ -32,7 +29,7 @@ pub enum RigError {
     Interfaces(Vec<String>),
     /// The plant failed.
     #[error(transparent)]
-    Plant(#[from] PlantError),
+    Plant(#[from] masseter_plant::PlantError),
     /// A step failed before, in the middle of a cycle.
     #[error("the rig failed in cycle {cycle}; reset it, or restore a snapshot")]
     Failed {
@@ -86,9 +83,9 @@ impl Rig {
         }
         let scenario = Scenario { seed, ..scenario.clone() };
         scenario.validate().map_err(|error| RigError::Scenario(error.into()))?;
-        let plan = RunPlan::new(scenario).map_err(|error| RigError::Scenario(error.into()))?;
+        let plan = masseter_plan::RunPlan::new(scenario).map_err(|error| RigError::Scenario(error.into()))?;
         let stepper = Stepper::new(&plan.scenario, plan.schedule, Latest::default())?;
-        let registry = Registry::new(&plan.scenario, &Declared::default());
+        let registry = Registry::new(&plan.scenario, &masseter_runtime::named::Declared::default());
         let mut rig = Self { scenario: Arc::new(plan.scenario), registry, stepper, has_failed: false };
         rig.stepper.begin_next_cycle()?;
         Ok(rig)

@@ -53,22 +53,18 @@ impl From<Withdrawn> for Without {
 }
 
 /// The controller of a run, and what accompanies it.
-pub(crate) struct Control {
+struct Control {
     controller: Box<dyn Controller>,
     duties: Duties,
     deadline: Deadline,
 }
 
 impl Control {
-    /// The controller of a run that has not begun. Tells what it declares.
-    pub(crate) fn new(
-        plan: &RunPlan,
-        mut controller: Box<dyn Controller>,
-        declared: &mut Declared,
-    ) -> anyhow::Result<Self> {
+    /// The controller of a run that has not begun.
+    fn new(plan: &RunPlan, mut controller: Box<dyn Controller>) -> anyhow::Result<Self> {
         let named = NamedValues::new(controller.declared(), &plan.scenario.parameters)?;
         set_parameters(&mut *controller, &named);
-        *declared = named.settings().declared().clone();
+        let declared = named.settings().declared();
         let operator = Operator::new(&plan.scenario, declared, EPOCH_NS)?;
         let deadline = Deadline::new(&plan.scenario, declared, plan.trajectory.duration_s());
         Ok(Self { controller, duties: Duties { named, operator }, deadline })
@@ -95,7 +91,7 @@ pub(crate) fn built(plan: &RunPlan, build: BuildController) -> Box<dyn Controlle
 /// use masseter_virtual_time::{Run, Sink};
 ///
 /// /// Counts the readings.
-/// #[derive(Default)]
+/// #[derive(Clone, Default)]
 /// struct Readings(usize);
 ///
 /// impl Sink for Readings {
@@ -119,7 +115,7 @@ pub(crate) fn built(plan: &RunPlan, build: BuildController) -> Box<dyn Controlle
 /// (0..100).try_for_each(|_| run.play_cycle())?;
 /// run.restore(&branch)?;
 /// (0..50).try_for_each(|_| run.play_cycle())?;
-/// assert_eq!(run.into_sink().0, 250);
+/// assert_eq!(run.into_sink().0, 150);
 /// # Ok::<(), anyhow::Error>(())
 /// ```
 pub struct Run<S> {
@@ -130,13 +126,15 @@ pub struct Run<S> {
     observed: Option<Observed>,
 }
 
-/// The state of a run at an instant: that of the rig, and that of the controller with its parameters and its operator.
+/// The state of a run at an instant: that of the rig, that of the controller with its parameters and its operator, and the
+/// sink.
 /// It lives in memory. The state of a rig alone goes [into a file](crate::Snapshot::write_to).
-pub struct RunSnapshot {
+pub struct RunSnapshot<S> {
     scenario: Arc<Scenario>,
     stepper: StepperState,
     control: Control,
     observed: Option<Observed>,
+    sink: S,
 }
 
 /// Why a run cannot go to a snapshot.
@@ -164,10 +162,17 @@ impl<S: Sink> Run<S> {
     /// # Errors
     /// As [`Self::new`].
     pub fn with_controller(plan: &RunPlan, controller: Box<dyn Controller>, sink: S) -> anyhow::Result<Self> {
-        Self::of_control(plan, Control::new(plan, controller, &mut Declared::default())?, sink)
+        Self::with_sink(plan, controller, |_| Ok(sink))
     }
 
-    pub(crate) fn of_control(plan: &RunPlan, control: Control, sink: S) -> anyhow::Result<Self> {
+    /// The same with the sink for what the controller declares.
+    pub(crate) fn with_sink(
+        plan: &RunPlan,
+        controller: Box<dyn Controller>,
+        sink: impl FnOnce(&Declared) -> anyhow::Result<S>,
+    ) -> anyhow::Result<Self> {
+        let control = Control::new(plan, controller)?;
+        let sink = sink(control.duties.named.settings().declared())?;
         let stepper = Stepper::new(&plan.scenario, plan.schedule, sink)?;
         Ok(Self { scenario: Arc::new(plan.scenario.clone()), stepper, control, observed: None })
     }
@@ -197,12 +202,17 @@ impl<S: Sink> Run<S> {
         stepper.end_decided(&mut **controller, duties, observed)
     }
 
+    /// What the controller declares.
+    pub fn declared(&self) -> &Declared {
+        self.control.duties.named.settings().declared()
+    }
+
     /// Where the messages went.
     pub fn sink(&self) -> &S {
         &self.stepper.ports.log.sink
     }
 
-    /// The same, to be changed, as after [`Self::restore`].
+    /// The same, to be changed.
     pub fn sink_mut(&mut self) -> &mut S {
         &mut self.stepper.ports.log.sink
     }
@@ -269,29 +279,32 @@ impl<S: Sink> Run<S> {
         }
     }
 
+    /// The sink, with what it took.
+    pub fn into_sink(self) -> S {
+        self.stepper.ports.log.sink
+    }
+}
+
+impl<S: Sink + Clone> Run<S> {
     /// The state of the run between two cycles, to be [restored](Self::restore) again and again.
     ///
     /// # Errors
     /// Where the controller or its pose law is not the rig's, and has no `branch`.
-    pub fn snapshot(&self) -> Result<RunSnapshot, NoBranch> {
-        let (scenario, stepper) = (self.scenario.clone(), self.stepper.state());
-        Ok(RunSnapshot { scenario, stepper, control: self.control.branch()?, observed: self.observed })
+    pub fn snapshot(&self) -> Result<RunSnapshot<S>, NoBranch> {
+        let (scenario, stepper, sink) = (self.scenario.clone(), self.stepper.state(), self.sink().clone());
+        Ok(RunSnapshot { scenario, stepper, control: self.control.branch()?, observed: self.observed, sink })
     }
 
-    /// Goes back, or on, to a snapshot. The cycles that follow are those that followed it. The sink keeps what it took.
+    /// Goes back, or on, to a snapshot. The cycles that follow are those that followed it.
     ///
     /// # Errors
     /// Where the snapshot is one of another scenario or seed. The run then goes on as it was.
-    pub fn restore(&mut self, snapshot: &RunSnapshot) -> Result<(), RestoreError> {
+    pub fn restore(&mut self, snapshot: &RunSnapshot<S>) -> Result<(), RestoreError> {
         OtherScenario::refuse(&self.scenario, &snapshot.scenario)?;
         self.control = snapshot.control.branch()?;
         self.observed = snapshot.observed;
         self.stepper.set_state(&snapshot.stepper);
+        self.sink_mut().clone_from(&snapshot.sink);
         Ok(())
-    }
-
-    /// The sink, with what it took.
-    pub fn into_sink(self) -> S {
-        self.stepper.ports.log.sink
     }
 }
