@@ -5,19 +5,14 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, ensure};
 use clap::Args;
-use masseter_campaign::{
-    Campaign, CampaignFile, CampaignFolder, CampaignLock, CaseResult, Factor, Method, Report, Sampler,
-    Search, StopRules, WorstCase,
-};
+use masseter_campaign::{Campaign, CampaignFile, CampaignFolder, Factor, Sampler, Search, StopRules};
 use masseter_plan::{Overrides, scenario_with_overrides};
 use masseter_recording::{RunFolder, time_in_names};
-use masseter_scenario::wording::counted;
-use masseter_table::{Format, ParquetProgram};
 use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 
 use crate::run::request::{ControllerChoice, ControllerKind};
-use crate::run::runner::{Runner, word};
-use crate::vary::play::{Player, open_cases, plan};
+use crate::run::runner::Runner;
+use crate::vary::play::{Player, plan};
 use crate::vary::search::{self, Found};
 use crate::vary::shrink::{self, Reason};
 
@@ -38,51 +33,15 @@ struct PlayArgs {
     record: usize,
 }
 
-/// A campaign in its folder, in which nobody else plays.
-struct Begun {
-    campaign: Campaign,
-    out: PathBuf,
-    folder: CampaignFolder,
-    _lock: CampaignLock,
-    runner: Runner,
-    record: usize,
-}
-
-impl Begun {
-    fn new(campaign: Campaign, file: &Path, args: &PlayArgs) -> Result<Self, Failure> {
+impl PlayArgs {
+    /// A campaign in its folder, in which nobody else plays.
+    fn begin(&self, campaign: Campaign, file: &Path) -> Result<Player, Failure> {
         let by_time = || {
             let name = file.file_stem().unwrap_or_default().to_string_lossy();
             Path::new("campaigns").join(format!("{}-{name}", time_in_names()))
         };
-        let out = args.out.clone().unwrap_or_else(by_time);
-        let (folder, lock) = CampaignFolder::begin(&out, &campaign).usage()?;
-        let runner = Runner::of_verb(ControllerChoice::Own(args.controller))?;
-        Ok(Self { campaign, out, folder, _lock: lock, runner, record: args.record })
-    }
-
-    fn player(&self) -> Player<'_> {
-        Player { runner: &self.runner, folder: &self.folder }
-    }
-
-    /// The report on the results, and the worst cases; none if the user interrupts.
-    fn report(&self, results: Vec<CaseResult>) -> Result<Option<(Report<'_>, Vec<WorstCase>)>, Failure> {
-        let out = word(&self.out.display().to_string());
-        if self.runner.is_interrupted() {
-            let ended = counted(results.len() as u64, "case");
-            status!("interrupted after {ended}; the same command with --out {out} goes on");
-            return Ok(None);
-        }
-        // CSV where the program that writes Parquet is missing, since no result may be lost for that.
-        let format = ParquetProgram::beside_this_one().map_or_else(
-            |missing| {
-                status!(
-                    "the table is CSV: {missing}; then the same command with --out {out} writes Parquet, too"
-                );
-                Format::Csv
-            },
-            Format::Parquet,
-        );
-        self.player().report(&self.campaign, results, format, self.record).map(Some)
+        let folder = CampaignFolder::begin(&self.out.clone().unwrap_or_else(by_time), &campaign).usage()?;
+        Ok(Player { campaign, folder, runner: Runner::of_verb(ControllerChoice::Own(self.controller))? })
     }
 }
 
@@ -107,16 +66,16 @@ pub(super) fn campaign(args: &CampaignArgs) -> Result<Exit, Failure> {
     if args.plan && campaign.file.stop_after != StopRules::default() {
         return Err(anyhow!("stop_after: a scheduler runs every case; leave the rule away")).usage();
     }
-    let begun = Begun::new(campaign, &args.file, &args.play)?;
+    let player = args.play.begin(campaign, &args.file)?;
     if args.plan {
-        let open = open_cases(&begun.campaign, &begun.folder).incomplete()?;
+        let open = player.open_cases().incomplete()?;
         result(&open.iter().map(|number| number.to_string() + "\n").collect::<String>()).incomplete()?;
         return Ok(Exit::Passed);
     }
-    status!("{} cases; results in {}", begun.campaign.case_count(), begun.out.display());
-    let results = begun.player().play_all(&begun.campaign)?;
-    let Some((report, _)) = begun.report(results)? else { return Ok(Exit::Interrupted) };
-    result(&report.in_words(&begun.folder)).incomplete()?;
+    status!("{} cases; results in {}", player.campaign.case_count(), player.folder.path().display());
+    let results = player.play_all()?;
+    let Some((report, _)) = player.report(results, args.play.record)? else { return Ok(Exit::Interrupted) };
+    result(&report.in_words(&player.folder)).incomplete()?;
     Ok(if report.is_success() { Exit::Passed } else { Exit::Failed })
 }
 
@@ -131,18 +90,8 @@ pub(super) struct SearchArgs {
     /// Requirement whose margin gets as small as possible, such as incisal.margin [default: the smallest of all]
     #[arg(long, value_name = "NAME")]
     minimise: Option<String>,
-    /// The most runs
-    #[arg(long, value_name = "N", default_value_t = 500)]
-    runs: usize,
-    /// How the next values are chosen
-    #[arg(long, value_enum, default_value_t)]
-    method: Method,
-    /// Seed of the chosen values
-    #[arg(long, default_value_t = 1)]
-    seed: u64,
-    /// Go on after the first margin below zero
-    #[arg(long)]
-    go_on: bool,
+    #[command(flatten)]
+    search: Search,
     #[command(flatten)]
     play: PlayArgs,
 }
@@ -161,25 +110,24 @@ pub(super) fn search(args: &SearchArgs) -> Result<Exit, Failure> {
     // The archive is that of a random campaign, whose points the search chooses.
     campaign.file = CampaignFile { sampler: Sampler::Random, runs: None, seeds: None, ..campaign.file };
     check_search(&campaign, args).usage()?;
-    let begun = Begun::new(campaign, &args.file, &args.play)?;
-    status!("at most {} runs; results in {}", args.runs, begun.out.display());
-    let SearchArgs { method, runs, seed, go_on: goes_on, .. } = *args;
-    let search = Search { method, dimension: begun.campaign.file.factors.len(), runs, seed, goes_on };
-    let Found { first, results } =
-        search::search(&search, args.requirement(), &begun.campaign, begun.player())?;
+    let player = args.play.begin(campaign, &args.file)?;
+    status!("at most {} runs; results in {}", args.search.runs, player.folder.path().display());
+    let Found { first, results } = search::search(&args.search, args.requirement(), &player)?;
     let runs = results.len();
-    let Some((report, worst)) = begun.report(results)? else { return Ok(Exit::Interrupted) };
+    let Some((report, worst)) = player.report(results, args.play.record)? else {
+        return Ok(Exit::Interrupted);
+    };
     let found = first.map_or_else(
         || format!("nothing below zero in {runs} runs\n"),
         |first| format!("below zero after {first} runs\n"),
     );
     let again = worst.first().map_or_else(String::new, |worst| format!("again: {}\n", worst.command));
-    result(&(found + &again + &report.files(&begun.folder))).incomplete()?;
+    result(&(found + &again + &report.files(&player.folder))).incomplete()?;
     Ok(if first.is_some() { Exit::Failed } else { Exit::Passed })
 }
 
 fn check_search(campaign: &Campaign, args: &SearchArgs) -> anyhow::Result<()> {
-    ensure!(args.runs > 0, "--runs: give at least 1");
+    ensure!(args.search.runs > 0, "--runs: give at least 1");
     let factors = &campaign.file.factors;
     ensure!(factors.iter().any(Factor::is_continuous), "a search needs a [[factor]] with a range");
     let names: Vec<_> = campaign.base()?.require.iter().map(|require| require.name.clone()).collect();

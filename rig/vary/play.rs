@@ -14,12 +14,11 @@ use masseter_campaign::{
 };
 use masseter_plan::{Overrides, scenario_with_overrides};
 use masseter_runtime::clock;
-use masseter_table::Format;
+use masseter_table::{Format, ParquetProgram};
 use masseter_terminal::{Exit, Failure, OrFailure, in_one_line, status};
-use rustix::process::getppid;
 
 use crate::run::request::{ClockKind, ControllerChoice, ControllerKind, name_of};
-use crate::run::runner::{Judged, Runner, Source};
+use crate::run::runner::{Judged, Runner, Source, word};
 use crate::run::{end_with_parent, resolve_simulated};
 
 /// Time between two lines of progress, ns.
@@ -56,7 +55,7 @@ pub(super) fn this_program() -> anyhow::Result<String> {
 /// campaign judges.
 pub(crate) fn play_case(folder: &Path, number: usize) -> Result<Exit, Failure> {
     // A worker that is killed takes its case along: no orphan computes what the next worker computes again.
-    end_with_parent(getppid()).died()?;
+    end_with_parent(rustix::process::getppid()).died()?;
     let (folder, campaign) = CampaignFolder::open(folder).usage()?;
     let kind =
         ControllerKind::from_str(&campaign.controller, false).map_err(|error| anyhow!(error)).usage()?;
@@ -67,32 +66,31 @@ pub(crate) fn play_case(folder: &Path, number: usize) -> Result<Exit, Failure> {
     if number >= count {
         return Err(anyhow!("the campaign has cases 0 to {}", count.saturating_sub(1))).usage();
     }
-    let runner = Runner::of_verb(ControllerChoice::Own(kind))?;
-    let result =
-        Player { runner: &runner, folder: &folder }.result_of(&campaign.case(&campaign.points(), number))?;
+    let player = Player { runner: Runner::of_verb(ControllerChoice::Own(kind))?, folder, campaign };
+    let result = player.result_of(&player.campaign.case(&player.campaign.points(), number))?;
     Ok(if result.is_some() { Exit::Passed } else { Exit::Interrupted })
 }
 
-/// The numbers of the cases without a result.
-pub(crate) fn open_cases(campaign: &Campaign, folder: &CampaignFolder) -> Result<Vec<usize>, FolderError> {
-    let points = campaign.points();
-    let mut open = Vec::new();
-    for number in 0..campaign.case_count() {
-        if folder.result_of(&campaign.case(&points, number))?.is_none() {
-            open.push(number);
+/// Plays the cases of a campaign, and keeps their results in its folder.
+pub(crate) struct Player {
+    pub(crate) campaign: Campaign,
+    pub(crate) folder: CampaignFolder,
+    pub(crate) runner: Runner,
+}
+
+impl Player {
+    /// The numbers of the cases without a result.
+    pub(crate) fn open_cases(&self) -> Result<Vec<usize>, FolderError> {
+        let points = self.campaign.points();
+        let mut open = Vec::new();
+        for number in 0..self.campaign.case_count() {
+            if self.folder.result_of(&self.campaign.case(&points, number))?.is_none() {
+                open.push(number);
+            }
         }
+        Ok(open)
     }
-    Ok(open)
-}
 
-/// Plays cases, and keeps their results in the folder of the campaign.
-#[derive(Clone, Copy)]
-pub(crate) struct Player<'a> {
-    pub(crate) runner: &'a Runner,
-    pub(crate) folder: &'a CampaignFolder,
-}
-
-impl Player<'_> {
     /// The result of a case: the kept one, or that of playing it now; none if the user interrupts.
     pub(super) fn result_of(&self, case: &Case) -> Result<Option<CaseResult>, Failure> {
         if let Some(kept) = self.folder.result_of(case).incomplete()? {
@@ -133,7 +131,8 @@ impl Player<'_> {
 
     /// Plays the cases on all cores in the order of their numbers, and stops by the rules of the campaign. Returns
     /// what has ended, in any order.
-    pub(crate) fn play_all(&self, campaign: &Campaign) -> Result<Vec<CaseResult>, Failure> {
+    pub(crate) fn play_all(&self) -> Result<Vec<CaseResult>, Failure> {
+        let campaign = &self.campaign;
         let points = campaign.points();
         let next = AtomicUsize::new(0);
         let tally = Mutex::new(Tally::new(campaign.case_count(), campaign.file.stop_after));
@@ -159,35 +158,45 @@ impl Player<'_> {
         Ok(ended.into_iter().collect::<Result<Vec<_>, _>>()?.concat())
     }
 
-    /// Writes report and table of the results, records this many of the worst cases, and reports these, too.
-    pub(crate) fn report<'a>(
+    /// Writes report and table of the results, records this many of the worst cases, and reports these, too. None if the
+    /// user interrupts.
+    pub(crate) fn report(
         &self,
-        campaign: &'a Campaign,
         results: Vec<CaseResult>,
-        format: Format,
         most: usize,
-    ) -> Result<(Report<'a>, Vec<WorstCase>), Failure> {
-        let report = Report::new(campaign, results, format);
+    ) -> Result<Option<(Report<'_>, Vec<WorstCase>)>, Failure> {
+        let out = word(&self.folder.path().display().to_string());
+        if self.runner.is_interrupted() {
+            let ended = masseter_scenario::wording::counted(results.len() as u64, "case");
+            status!("interrupted after {ended}; the same command with --out {out} goes on");
+            return Ok(None);
+        }
+        // CSV where the program that writes Parquet is missing, since no result may be lost for that.
+        let format = ParquetProgram::beside_this_one().map_or_else(
+            |missing| {
+                status!(
+                    "the table is CSV: {missing}; then the same command with --out {out} writes Parquet, too"
+                );
+                Format::Csv
+            },
+            Format::Parquet,
+        );
+        let report = Report::new(&self.campaign, results, format);
         // Whatever becomes of the recordings, the results are there.
-        masseter_campaign::write(&report, self.folder, &[]).incomplete()?;
-        let worst = self.keep_worst(&report, campaign, most)?;
-        masseter_campaign::write(&report, self.folder, &worst).incomplete()?;
-        Ok((report, worst))
+        masseter_campaign::write(&report, &self.folder, &[]).incomplete()?;
+        let worst = self.keep_worst(&report, most)?;
+        masseter_campaign::write(&report, &self.folder, &worst).incomplete()?;
+        Ok(Some((report, worst)))
     }
 
     /// Writes the scenarios of the worst cases. Those that ran are recorded, byte by byte as they ran before.
-    fn keep_worst(
-        &self,
-        report: &Report<'_>,
-        campaign: &Campaign,
-        most: usize,
-    ) -> Result<Vec<WorstCase>, Failure> {
+    fn keep_worst(&self, report: &Report<'_>, most: usize) -> Result<Vec<WorstCase>, Failure> {
         let parent = self.folder.file(WORST);
         let unmade = || format!("cannot make {}", parent.display());
         fs::create_dir_all(&parent).with_context(unmade).incomplete()?;
         let mut kept = Vec::new();
         for result in report.worst(most) {
-            let Ok(scenario) = campaign.case_of(result).scenario else { continue };
+            let Ok(scenario) = self.campaign.case_of(result).scenario else { continue };
             let run = parent.join(format!("case-{}-{}", result.number, result.id));
             let file = run.with_extension("toml");
             let written = fs::write(&file, scenario.to_toml());
@@ -212,7 +221,7 @@ impl Player<'_> {
 }
 
 /// The value of a mutex, which no thread holds when it panics.
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 

@@ -1,11 +1,6 @@
 //! The search for the values of a campaign's factors with the smallest margin.
 
-use std::sync::{Mutex, PoisonError};
-
-use masseter_campaign::{Campaign, CaseResult, Search, Value};
-use masseter_terminal::Failure;
-
-use super::play::{Player, lock};
+use masseter_campaign::{CaseResult, Search, Value};
 
 /// The value of a case that did not pass although no margin shows it: below every one that does.
 const STOPPED: f64 = -1.0;
@@ -21,29 +16,22 @@ pub(crate) struct Found {
 pub(crate) fn search(
     search: &Search,
     requirement: Option<&str>,
-    campaign: &Campaign,
-    player: Player<'_>,
-) -> Result<Found, Failure> {
-    let results = Mutex::new(Vec::new());
-    let failed = Mutex::new(None);
-    let evaluate = |number: usize, point: &[f64]| match player.result_of(&campaign.case_at(number, point, 0))
-    {
-        Ok(Some(result)) => {
-            let value = value(&result, requirement);
-            lock(&results).push(CaseResult { number, ..result });
-            value
-        }
-        Ok(None) => Value::End,
-        Err(failure) => {
-            lock(&failed).get_or_insert(failure);
-            Value::End
-        }
-    };
-    let first = search.run(evaluate);
-    match failed.into_inner().unwrap_or_else(PoisonError::into_inner) {
-        Some(failure) => Err(failure),
-        None => Ok(Found { first, results: results.into_inner().unwrap_or_else(PoisonError::into_inner) }),
-    }
+    player: &super::play::Player,
+) -> Result<Found, masseter_terminal::Failure> {
+    let (ended, results) = std::sync::mpsc::channel();
+    let campaign = &player.campaign;
+    let first = search.run(campaign.file.factors.len(), |number, point| {
+        let Some(result) = player.result_of(&campaign.case_at(number, point, 0)).transpose() else {
+            return Value::End;
+        };
+        let value = result.as_ref().map_or(Value::End, |result| value(result, requirement));
+        ended
+            .send(result.map(|result| CaseResult { number, ..result }))
+            .expect("the results are taken below");
+        value
+    });
+    drop(ended);
+    Ok(Found { first, results: results.into_iter().collect::<Result<_, _>>()? })
 }
 
 /// The margin that leads the search: that of the named requirement, or the smallest of all, as a share of its limit.
@@ -67,7 +55,7 @@ fn value(result: &CaseResult, requirement: Option<&str>) -> Value {
 
 #[cfg(test)]
 mod tests {
-    use masseter_campaign::Method;
+    use masseter_campaign::{Campaign, Method};
     use masseter_controller::motion_controller::MotionController;
     use masseter_controller::pose_law::{Demand, LawFailed, PoseLaw};
     use masseter_model::geometry::{Pose, Vec3};
@@ -155,7 +143,7 @@ range = [0.5, 1.0]
     /// The runs until a margin below zero.
     fn runs_until_found(method: Method, seed: u64, campaign: &Campaign) -> usize {
         let runner = Runner::default();
-        let search = Search { method, dimension: 4, runs: 5000, seed, goes_on: false };
+        let search = Search { method, runs: 5000, seed, go_on: false };
         let evaluate = |number: usize, point: &[f64]| {
             let case = campaign.case_at(number, point, 0);
             let scenario = case.scenario.as_ref().expect("every point is a scenario");
@@ -170,7 +158,7 @@ range = [0.5, 1.0]
                 played.map_err(|failure| failure.error).expect("every point can be played");
             value(&CaseResult::new(&case, &verdict, &figures, 0.0), Some("incisal"))
         };
-        search.run(evaluate).expect("the corner is found")
+        search.run(4, evaluate).expect("the corner is found")
     }
 
     #[test]

@@ -10,8 +10,6 @@ use std::path::{Path, PathBuf};
 use masseter_scenario::Scenario;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use rustix::fs::{FlockOperation, flock};
-use serde::de::DeserializeOwned;
-use tempfile::TempDir;
 
 use crate::campaign::Campaign;
 use crate::case::{Case, CaseResult};
@@ -44,15 +42,11 @@ pub enum FolderError {
 }
 
 /// A campaign on the disk.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct CampaignFolder {
     path: PathBuf,
-}
-
-/// The right to run a campaign; given back when it is dropped or its process dies.
-#[derive(Debug)]
-pub struct CampaignLock {
-    _file: File,
+    /// The right to run the campaign; given back when it is dropped or its process dies. None for a single case.
+    _lock: Option<File>,
 }
 
 impl CampaignFolder {
@@ -60,8 +54,8 @@ impl CampaignFolder {
     ///
     /// # Errors
     /// [`FolderError`]: another campaign is there, or a process runs this one.
-    pub fn begin(path: &Path, campaign: &Campaign) -> Result<(Self, CampaignLock), FolderError> {
-        let folder = Self { path: path.to_owned() };
+    pub fn begin(path: &Path, campaign: &Campaign) -> Result<Self, FolderError> {
+        let folder = Self { path: path.to_owned(), _lock: None };
         if path.is_dir() && !folder.plan_path().exists() && fs::read_dir(path).is_ok_and(has_more_than_a_lock)
         {
             return Err(FolderError::NoCampaign(path.to_owned()));
@@ -69,7 +63,7 @@ impl CampaignFolder {
         for inner in [folder.cases_path(), folder.path.join(ATTEMPTS)] {
             fs::create_dir_all(&inner).map_err(system(&inner))?;
         }
-        let lock = CampaignLock { _file: lock(path)? };
+        let folder = Self { _lock: Some(lock(path)?), ..folder };
         if folder.plan_path().exists() {
             let difference = folder.read_plan()?.difference_to(campaign);
             difference.map_or(Ok(()), |words| Err(FolderError::OfAnother(path.to_owned(), words)))?;
@@ -81,7 +75,7 @@ impl CampaignFolder {
             written.map_err(system(&folder.plan_path()))?;
         }
         folder.sweep()?;
-        Ok((folder, lock))
+        Ok(folder)
     }
 
     /// Opens the folder of a campaign that has begun, and reads its plan.
@@ -89,12 +83,17 @@ impl CampaignFolder {
     /// # Errors
     /// [`FolderError`]: no campaign is there.
     pub fn open(path: &Path) -> Result<(Self, Campaign), FolderError> {
-        let folder = Self { path: path.to_owned() };
+        let folder = Self { path: path.to_owned(), _lock: None };
         if !folder.plan_path().is_file() {
             return Err(FolderError::NoCampaign(path.to_owned()));
         }
         let campaign = folder.read_plan()?;
         Ok((folder, campaign))
+    }
+
+    /// The folder itself.
+    pub fn path(&self) -> &Path {
+        &self.path
     }
 
     /// Another file of this name.
@@ -166,7 +165,7 @@ impl CampaignFolder {
 /// A case that is being run.
 #[derive(Debug)]
 pub struct Attempt {
-    folder: TempDir,
+    folder: tempfile::TempDir,
     target: PathBuf,
     _lock: File,
 }
@@ -226,7 +225,7 @@ fn read_result(path: &Path) -> Result<CaseResult, FolderError> {
     read_json(path, "result")
 }
 
-fn read_json<T: DeserializeOwned>(path: &Path, what: &str) -> Result<T, FolderError> {
+fn read_json<T: serde::de::DeserializeOwned>(path: &Path, what: &str) -> Result<T, FolderError> {
     let text = read_text(path, MOST_KEPT_BYTES).map_err(system(path))?;
     serde_json::from_str(&text)
         .map_err(|error| FolderError::Damaged(path.to_owned(), format!("it is no {what}: {error}")))
@@ -274,15 +273,15 @@ mod tests {
     fn a_campaign_goes_on_where_it_was_and_keeps_each_result_once() {
         let parent = tempfile::tempdir().unwrap();
         let path = parent.path().join("campaign");
-        let (folder, lock) = CampaignFolder::begin(&path, &two()).unwrap();
+        let folder = CampaignFolder::begin(&path, &two()).unwrap();
         let first = case(0);
         folder.attempt(&first).unwrap().keep_result(&failed(&first), first.scenario.as_ref().ok()).unwrap();
         // The second attempt comes too late, and does no harm.
         let late = CaseResult { word: "PASS".to_owned(), exit_code: 0, ..failed(&first) };
         folder.attempt(&first).unwrap().keep_result(&late, first.scenario.as_ref().ok()).unwrap();
-        drop(lock);
+        drop(folder);
 
-        let (folder, _lock) = CampaignFolder::begin(&path, &two()).unwrap();
+        let folder = CampaignFolder::begin(&path, &two()).unwrap();
         assert_eq!(folder.result_of(&case(1)).unwrap(), None);
         assert_eq!(results(&folder).unwrap(), [failed(&first)]);
         assert!(path.join(CASES).join(&first.id).join(SCENARIO).is_file());
@@ -292,14 +291,14 @@ mod tests {
     #[test]
     fn an_attempt_of_a_dead_process_is_swept_and_a_live_one_stays() {
         let parent = tempfile::tempdir().unwrap();
-        let (folder, lock) = CampaignFolder::begin(parent.path(), &two()).unwrap();
+        let folder = CampaignFolder::begin(parent.path(), &two()).unwrap();
         let live = folder.attempt(&case(0)).unwrap();
         let attempts = parent.path().join(ATTEMPTS);
         let [dead, dead_before_its_lock] = ["00001-dead.x", "00002-dead.y"].map(|name| attempts.join(name));
         fs::create_dir(&dead).unwrap();
         fs::write(dead.join(LOCK), "").unwrap();
         fs::create_dir(&dead_before_its_lock).unwrap();
-        drop(lock);
+        drop(folder);
         CampaignFolder::begin(parent.path(), &two()).unwrap();
         assert!(!dead.exists() && !dead_before_its_lock.exists() && live.folder.path().exists());
     }
@@ -307,11 +306,11 @@ mod tests {
     #[test]
     fn the_folder_of_another_campaign_is_refused_with_the_difference() {
         let parent = tempfile::tempdir().unwrap();
-        let (_, lock) = CampaignFolder::begin(parent.path(), &two()).unwrap();
+        let folder = CampaignFolder::begin(parent.path(), &two()).unwrap();
         let refusal =
             |campaign: &Campaign| CampaignFolder::begin(parent.path(), campaign).unwrap_err().to_string();
         assert!(refusal(&two()).contains("another masseter runs"));
-        drop(lock);
+        drop(folder);
         let other = campaign("[[factor]]\nkey = 'rate_hz'\nvalues = [500, 1000, 2000]");
         assert!(refusal(&other).contains("the file of the campaign has changed"), "{}", refusal(&other));
         let rebuilt = Campaign { program: "other".to_owned(), ..two() };
@@ -330,7 +329,7 @@ mod tests {
     #[test]
     fn a_result_takes_the_place_of_what_is_none() {
         let parent = tempfile::tempdir().unwrap();
-        let (folder, _lock) = CampaignFolder::begin(parent.path(), &two()).unwrap();
+        let folder = CampaignFolder::begin(parent.path(), &two()).unwrap();
         let left = parent.path().join(CASES).join(case(0).id);
         fs::create_dir(&left).unwrap();
         fs::write(left.join(SCENARIO), "").unwrap();
@@ -341,7 +340,7 @@ mod tests {
     #[test]
     fn a_file_without_an_end_is_refused_at_once() {
         let parent = tempfile::tempdir().unwrap();
-        let (folder, _lock) = CampaignFolder::begin(parent.path(), &two()).unwrap();
+        let folder = CampaignFolder::begin(parent.path(), &two()).unwrap();
         let endless = |path: &Path| std::os::unix::fs::symlink("/dev/zero", path).unwrap();
         let kept = parent.path().join(CASES).join(case(0).id);
         fs::create_dir(&kept).unwrap();
@@ -355,7 +354,7 @@ mod tests {
     #[test]
     fn a_damaged_result_is_named() {
         let parent = tempfile::tempdir().unwrap();
-        let (folder, _lock) = CampaignFolder::begin(parent.path(), &two()).unwrap();
+        let folder = CampaignFolder::begin(parent.path(), &two()).unwrap();
         let kept = parent.path().join(CASES).join(case(0).id);
         fs::create_dir(&kept).unwrap();
         fs::write(kept.join(RESULT), "{").unwrap();

@@ -23,7 +23,7 @@ pub use case::{Case, CaseCheck, CaseResult};
 pub use factor::{Distribution, Factor, Setting};
 pub use fault_matrix::{Coverage, FaultRow, fault_matrix_in_words, write_fault_matrix};
 pub use files::write;
-pub use folder::{Attempt, CampaignFolder, CampaignLock, FolderError};
+pub use folder::{Attempt, CampaignFolder, FolderError};
 pub use laws::{Broken, Law};
 pub use report::{Report, SuccessRate, WorstCase};
 pub use search::{Method, Search, Value};

@@ -1,12 +1,10 @@
 //! Search for the smallest margin: points of the unit cube whose values are evaluated, by CMA-ES or at random.
 
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 
-use clap::ValueEnum;
+use clap::{Args, ValueEnum};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand::{RngExt, SeedableRng};
-use rand_distr::StandardNormal;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
@@ -32,68 +30,91 @@ pub enum Method {
 }
 
 /// A search over the unit cube.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
 pub struct Search {
-    /// How the next points are chosen.
-    pub method: Method,
-    /// Factors.
-    pub dimension: usize,
-    /// The most evaluations.
+    /// The most runs
+    #[arg(long, value_name = "N", default_value_t = 500)]
     pub runs: usize,
-    /// The seed of the points.
+    /// How the next values are chosen
+    #[arg(long, value_enum, default_value_t)]
+    pub method: Method,
+    /// Seed of the chosen values
+    #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Whether the search goes on after a value below zero.
-    pub goes_on: bool,
+    /// Go on after the first margin below zero
+    #[arg(long)]
+    pub go_on: bool,
 }
 
 impl Search {
-    /// Evaluates points until the runs are spent, or a value lies below zero. `evaluate` gets the number of the
-    /// evaluation and the point. It returns none if the point has no value, and is called on all cores at once.
-    /// Returns the number of evaluations up to the first value below zero, if there is one.
-    pub fn run(&self, evaluate: impl Fn(usize, &[f64]) -> Value + Sync) -> Option<usize> {
-        let watch = Watch {
-            search: self,
-            next: AtomicUsize::new(0),
-            is_over: AtomicBool::new(false),
-            found: Mutex::new(None),
+    /// Evaluates points in so many dimensions until the runs are spent, or a value lies below zero. `evaluate` gets the
+    /// number of the evaluation and the point, and is called on all cores at once. Returns the number of evaluations up to
+    /// the first value below zero, if there is one.
+    pub fn run(&self, dimension: usize, evaluate: impl Fn(usize, &[f64]) -> Value + Sync) -> Option<usize> {
+        let (next, first) = (AtomicUsize::new(0), AtomicUsize::new(usize::MAX));
+        let has_ended = AtomicBool::new(false);
+        let is_over = || has_ended.load(Relaxed) || next.load(Relaxed) >= self.runs;
+        let value = |point: &[f64]| {
+            let number = if is_over() { self.runs } else { next.fetch_add(1, Relaxed) };
+            if number >= self.runs {
+                return NOTHING;
+            }
+            match evaluate(number, point) {
+                Value::Margin(margin) => {
+                    if margin < 0.0 {
+                        first.fetch_min(number + 1, Relaxed);
+                        has_ended.fetch_or(!self.go_on, Relaxed);
+                    }
+                    return margin;
+                }
+                Value::Nothing => {}
+                Value::End => has_ended.store(true, Relaxed),
+            }
+            NOTHING
         };
-        let evaluate = |point: &[f64]| watch.evaluate(point, &evaluate);
         match self.method {
-            Method::Random => self.at_random(&watch, &evaluate),
-            Method::CmaEs => self.by_covariance(&watch, &evaluate),
+            Method::Random => self.at_random(dimension, is_over, value),
+            Method::CmaEs => self.by_covariance(dimension, is_over, value),
         }
-        watch.found.into_inner().unwrap_or_else(PoisonError::into_inner)
+        Some(first.into_inner()).filter(|first| *first < usize::MAX)
     }
 
-    fn at_random(&self, watch: &Watch<'_>, evaluate: &(impl Fn(&[f64]) -> f64 + Sync)) {
+    fn at_random(&self, dimension: usize, is_over: impl Fn() -> bool, value: impl Fn(&[f64]) -> f64 + Sync) {
         let mut random = Pcg64::seed_from_u64(self.seed);
-        while !watch.is_over() {
-            let batch: Vec<Vec<f64>> = (0..rayon::current_num_threads())
-                .map(|_| (0..self.dimension).map(|_| random.random()).collect())
-                .collect();
-            batch.par_iter().for_each(|point| {
-                evaluate(point);
+        while !is_over() {
+            let batch = (0..rayon::current_num_threads()).map(|_| anywhere(dimension, &mut random));
+            batch.collect::<Vec<_>>().par_iter().for_each(|point| {
+                value(point);
             });
         }
     }
 
-    fn by_covariance(&self, watch: &Watch<'_>, evaluate: &(impl Fn(&[f64]) -> f64 + Sync)) {
+    fn by_covariance(
+        &self,
+        dimension: usize,
+        is_over: impl Fn() -> bool,
+        value: impl Fn(&[f64]) -> f64 + Sync,
+    ) {
         let mut random = Pcg64::seed_from_u64(self.seed);
-        let mut start = vec![0.5; self.dimension];
-        while !watch.is_over() {
+        let mut start = vec![0.5; dimension];
+        let valued = |point: DVector<f64>| {
+            let inside: Vec<_> = point.iter().map(|x| reflected(*x)).collect();
+            (value(&inside), point)
+        };
+        while !is_over() {
             let mut generations = Generations::new(start, STEP);
-            while !watch.is_over() && !generations.has_converged {
+            while !is_over() && !generations.has_converged {
                 let points = generations.points(&mut random);
-                let value = |point: &DVector<f64>| {
-                    let inside: Vec<_> = point.iter().map(|x| reflected(*x)).collect();
-                    evaluate(&inside)
-                };
-                let valued = points.into_par_iter().map(|point| (value(&point), point)).collect();
-                generations.learn(valued);
+                generations.learn(points.into_par_iter().map(valued).collect());
             }
-            start = (0..self.dimension).map(|_| random.random()).collect();
+            start = anywhere(dimension, &mut random);
         }
     }
+}
+
+/// A random point.
+fn anywhere(dimension: usize, random: &mut Pcg64) -> Vec<f64> {
+    (0..dimension).map(|_| random.random()).collect()
 }
 
 /// What an evaluation gives: a value, nothing, or the end of the search.
@@ -105,45 +126,6 @@ pub enum Value {
     Nothing,
     /// The user ends the search.
     End,
-}
-
-/// Counts the evaluations, and sees when the search is over.
-struct Watch<'a> {
-    search: &'a Search,
-    next: AtomicUsize,
-    is_over: AtomicBool,
-    found: Mutex<Option<usize>>,
-}
-
-impl Watch<'_> {
-    fn is_over(&self) -> bool {
-        self.is_over.load(Ordering::Relaxed) || self.next.load(Ordering::Relaxed) >= self.search.runs
-    }
-
-    fn evaluate(&self, point: &[f64], evaluate: &impl Fn(usize, &[f64]) -> Value) -> f64 {
-        if self.is_over() {
-            return NOTHING;
-        }
-        let number = self.next.fetch_add(1, Ordering::Relaxed);
-        if number >= self.search.runs {
-            return NOTHING;
-        }
-        match evaluate(number, point) {
-            Value::End => {
-                self.is_over.store(true, Ordering::Relaxed);
-                NOTHING
-            }
-            Value::Nothing => NOTHING,
-            Value::Margin(margin) => {
-                if margin < 0.0 {
-                    let mut found = self.found.lock().unwrap_or_else(PoisonError::into_inner);
-                    *found = Some(found.map_or(number + 1, |first: usize| first.min(number + 1)));
-                    self.is_over.fetch_or(!self.search.goes_on, Ordering::Relaxed);
-                }
-                margin
-            }
-        }
-    }
 }
 
 /// A number folded into \[0, 1) at the ends.
@@ -201,7 +183,7 @@ impl Generations {
     fn points(&self, random: &mut Pcg64) -> Vec<DVector<f64>> {
         let n = self.mean.len();
         let point = |_| {
-            let normal = DVector::from_fn(n, |_, _| random.sample(StandardNormal));
+            let normal = DVector::from_fn(n, |_, _| random.sample(rand_distr::StandardNormal));
             &self.mean + &self.axes * normal * self.step
         };
         (0..points_of(n)).map(point).collect()
@@ -286,12 +268,12 @@ mod tests {
     }
 
     fn search(method: Method, seed: u64) -> Search {
-        Search { method, dimension: 4, runs: 20_000, seed, goes_on: false }
+        Search { method, runs: 20_000, seed, go_on: false }
     }
 
     fn median_runs(method: Method) -> usize {
         let find =
-            |seed| search(method, seed).run(|_, point| Value::Margin(corner(point))).unwrap_or(usize::MAX);
+            |seed| search(method, seed).run(4, |_, point| Value::Margin(corner(point))).unwrap_or(usize::MAX);
         let mut runs: Vec<_> = (1..=20).map(find).collect();
         runs.sort_unstable();
         runs[10]
@@ -308,8 +290,8 @@ mod tests {
         for method in [Method::CmaEs, Method::Random] {
             let count = AtomicUsize::new(0);
             let limited = Search { runs: 37, ..search(method, 1) };
-            let found = limited.run(|_, point| {
-                count.fetch_add(1, Ordering::Relaxed);
+            let found = limited.run(4, |_, point| {
+                count.fetch_add(1, Relaxed);
                 assert!(point.iter().all(|u| (0.0..1.0).contains(u)));
                 Value::Margin(1.0)
             });
@@ -319,7 +301,7 @@ mod tests {
 
     #[test]
     fn what_says_nothing_is_no_finding() {
-        let found = Search { runs: 50, ..search(Method::CmaEs, 1) }.run(|_, _| Value::Nothing);
+        let found = Search { runs: 50, ..search(Method::CmaEs, 1) }.run(4, |_, _| Value::Nothing);
         assert_eq!(found, None);
     }
 
