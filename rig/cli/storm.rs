@@ -2,18 +2,14 @@
 
 use std::path::PathBuf;
 
-use anyhow::ensure;
-use clap::{Args, value_parser};
 use masseter_plan::{Overrides, scenario_with_overrides};
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, status};
 
 use crate::run::request::{ControllerChoice, ControllerKind};
-use crate::run::resolve_simulated;
-use crate::run::runner::Runner;
 use crate::vary::storm::{self, Limits, Season};
 
 /// The arguments of `storm`.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, clap::Args)]
 #[command(
     after_help = "Examples:\n  masseter storm --seed 7\n  masseter storm chewing.toml --seed 7 --minutes 60 --out storms/7\n\nThe same command with the same --out goes on where it was."
 )]
@@ -26,15 +22,8 @@ pub(super) struct StormArgs {
     /// The number of the first storm [default: 0, or where the storms of the folder go on]
     #[arg(long, value_name = "N")]
     from: Option<u64>,
-    /// The most storms of this call
-    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = value_parser!(u64).range(1..))]
-    storms: u64,
-    /// The most time of this call, instead of a number of storms
-    #[arg(long, value_name = "MINUTES", conflicts_with = "storms", value_parser = minutes)]
-    minutes: Option<f64>,
-    /// Go on after a storm that breaks a law
-    #[arg(long)]
-    go_on: bool,
+    #[command(flatten)]
+    limits: Limits,
     /// Folder of the log and of the storms that break a law; storms begun there go on [default: storms/SEED]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -46,27 +35,16 @@ pub(super) struct StormArgs {
     format: Format,
 }
 
-fn minutes(text: &str) -> anyhow::Result<f64> {
-    let minutes: f64 = text.parse()?;
-    ensure!(minutes.is_finite() && minutes > 0.0, "give a time above 0");
-    Ok(minutes)
-}
-
 /// Plays storms; [`Exit::Failed`] where one breaks a law.
 pub(super) fn storm(args: &StormArgs) -> Result<Exit, Failure> {
     let base = scenario_with_overrides(args.scenario.as_deref(), &Overrides::default()).usage()?;
     // A mistake in the scenario itself is in every storm.
-    resolve_simulated(&base, args.scenario.as_deref(), args.controller.builder()).usage()?;
-    let runner = Runner::of_verb(ControllerChoice::Own(args.controller))?;
+    crate::run::resolve_simulated(&base, args.scenario.as_deref(), args.controller.builder()).usage()?;
+    let runner = crate::run::runner::Runner::of_verb(ControllerChoice::Own(args.controller))?;
     let out = args.out.clone().unwrap_or_else(|| PathBuf::from("storms").join(args.seed.to_string()));
     let season = Season::begin(&runner, &base, args.seed, args.from, &out).usage()?;
-    let limits = Limits {
-        storms: if args.minutes.is_some() { u64::MAX } else { args.storms },
-        time_s: args.minutes.map_or(f64::INFINITY, |minutes| minutes * 60.0),
-        goes_on: args.go_on,
-    };
     status!("storms of seed {}; log in {}", args.seed, out.display());
-    let log = season.play(limits)?;
+    let log = season.play(args.limits)?;
     let text = match args.format {
         Format::Human => storm::in_words(&log),
         Format::Json => serde_json::to_string_pretty(&log).expect("a log has a JSON form") + "\n",

@@ -1,6 +1,5 @@
 //! `masseter test`: the scenarios of folders as a suite, listed in the form of `cargo test`.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
@@ -15,7 +14,6 @@ use masseter_terminal::{Exit, Failure, Format, OrFailure, result, result_line, s
 
 use crate::run::request::{ClockKind, ControllerChoice};
 use crate::vary::suite::cases::{Case, Cases, Selection};
-use crate::vary::suite::choice::{Choice, Shard};
 use crate::{BUILD, run::runner::Runner, vary::suite::Suite};
 
 /// The arguments of `test`.
@@ -33,15 +31,8 @@ pub(super) struct TestArgs {
     /// Who controls the robot: motion, hold, or the path of your own program
     #[arg(long, value_name = "motion|hold|PATH", default_value = "motion", hide_default_value = true)]
     controller: ControllerChoice,
-    /// Run only the scenarios with these words in their names or as tags, joined by and, or, not and parentheses
-    #[arg(short = 'k', long = "filter", value_name = "EXPRESSION")]
-    choice: Option<Choice>,
-    /// Run only the scenarios with this tag; of several, with any of them
-    #[arg(long = "tag", value_name = "TAG")]
-    tags: Vec<String>,
-    /// Run only this share of the scenarios, such as 2/5, on one of five machines
-    #[arg(long, value_name = "NUMBER/OF")]
-    shard: Option<Shard>,
+    #[command(flatten)]
+    selection: Selection,
     /// Run a scenario up to this many times again: in real time one that is INVALID, in lockstep one that failed, which
     /// must fail again the same
     #[arg(long, value_name = "N", default_value_t, hide_default_value = true)]
@@ -82,8 +73,7 @@ fn test_clocks() -> impl TypedValueParser<Value = ClockKind> {
 pub(super) fn test(args: &TestArgs) -> Result<Exit, Failure> {
     let began_ns = clock::now_ns();
     check_controller(&args.controller).usage()?;
-    let selection = Selection { choice: args.choice.clone(), tags: args.tags.clone(), shard: args.shard };
-    let Cases { chosen, filtered_out, left_out } = Cases::find(&args.paths, &selection).usage()?;
+    let Cases { chosen, filtered_out, left_out } = Cases::find(&args.paths, &args.selection).usage()?;
     check_reports(args, &chosen).usage()?;
     let baseline = args.baseline.as_deref().map(Baseline::read).transpose().usage()?;
     let out = out_folder(args).usage()?;
@@ -130,7 +120,7 @@ pub(super) fn test(args: &TestArgs) -> Result<Exit, Failure> {
 }
 
 fn write_document(path: &Path, text: &str) -> anyhow::Result<()> {
-    fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+    std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// Refuses a controller that somebody else would have to start, and a suite without one.

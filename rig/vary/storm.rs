@@ -8,6 +8,7 @@ use std::fs::{self, File};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, anyhow, ensure};
+use clap::{Args, value_parser};
 use masseter_campaign::{Broken, Law, Shrink, Storms};
 use masseter_runtime::clock;
 use masseter_scenario::Scenario;
@@ -17,8 +18,6 @@ use rayon::prelude::*;
 use rustix::fs::{FlockOperation, flock};
 use serde::{Deserialize, Serialize};
 
-use super::play::this_program;
-use crate::run::request::ClockKind;
 use crate::run::runner::{Judged, Runner, Source};
 
 /// Storms between two looks at clock, interrupts and disk, a core.
@@ -72,14 +71,23 @@ pub(crate) struct Violation {
 }
 
 /// When storms end, beside at the first that breaks a law.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Args)]
 pub(crate) struct Limits {
-    /// The most storms.
-    pub(crate) storms: u64,
-    /// The most time, s.
-    pub(crate) time_s: f64,
-    /// Whether they go on after one that breaks a law.
-    pub(crate) goes_on: bool,
+    /// The most storms of this call
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = value_parser!(u64).range(1..))]
+    storms: u64,
+    /// The most time of this call, instead of a number of storms
+    #[arg(long, value_name = "MINUTES", conflicts_with = "storms", value_parser = parse_minutes)]
+    minutes: Option<f64>,
+    /// Go on after a storm that breaks a law
+    #[arg(long)]
+    go_on: bool,
+}
+
+fn parse_minutes(text: &str) -> anyhow::Result<f64> {
+    let minutes: f64 = text.parse()?;
+    ensure!(minutes.is_finite() && minutes > 0.0, "give a time above 0");
+    Ok(minutes)
 }
 
 /// Storms in their folder, in which nobody else plays.
@@ -106,7 +114,7 @@ impl<'a> Season<'a> {
             .map_err(|_| anyhow!("another masseter plays storms in {}", out.display()))?;
         let new = StormLog {
             seed,
-            program: this_program()?,
+            program: super::play::this_program()?,
             controller: runner.controller.name().unwrap_or_default(),
             base: base.to_toml(),
             next: from.unwrap_or(0),
@@ -129,10 +137,12 @@ impl<'a> Season<'a> {
 
     /// Plays storms until a law is broken, a limit is reached or the user interrupts.
     pub(crate) fn play(mut self, limits: Limits) -> Result<StormLog, Failure> {
-        let (began_ns, mut said_ns, mut left) = (clock::now_ns(), clock::now_ns(), limits.storms);
+        let (began_ns, mut said_ns) = (clock::now_ns(), clock::now_ns());
+        let (mut left, most_s) =
+            limits.minutes.map_or((limits.storms, f64::INFINITY), |minutes| (u64::MAX, minutes * 60.0));
         let lasted_s = |now_ns: u64| (now_ns - began_ns) as f64 / 1e9;
         let before_s = self.log.took_s;
-        while left > 0 && lasted_s(clock::now_ns()) < limits.time_s {
+        while left > 0 && lasted_s(clock::now_ns()) < most_s {
             let count = left.min((BATCH * rayon::current_num_threads()) as u64);
             let numbers = self.log.next..self.log.next + count;
             let played: Vec<_> = numbers.into_par_iter().map(|number| self.play_one(number)).collect();
@@ -145,7 +155,7 @@ impl<'a> Season<'a> {
             let now_ns = clock::now_ns();
             self.log.took_s = before_s + lasted_s(now_ns);
             self.write()?;
-            if broken && !limits.goes_on {
+            if broken && !limits.go_on {
                 break;
             }
             if now_ns - said_ns >= PROGRESS_EVERY_NS {
@@ -247,7 +257,7 @@ impl<'a> Season<'a> {
             write(&small, &text)?;
             smallest = Some(small);
         }
-        let again = self.runner.command(path.as_path().into(), ClockKind::Virtual);
+        let again = self.runner.command(path.as_path().into(), crate::run::request::ClockKind::Virtual);
         Ok(Violation { number, broken, scenario: path, again, smallest })
     }
 

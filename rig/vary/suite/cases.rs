@@ -33,11 +33,16 @@ impl Case {
 }
 
 /// Which scenarios of a suite run.
-#[derive(Debug, Default)]
+#[derive(Debug, Clone, Default, clap::Args)]
 pub(crate) struct Selection {
+    /// Run only the scenarios with these words in their names or as tags, joined by and, or, not and parentheses
+    #[arg(short = 'k', long = "filter", value_name = "EXPRESSION")]
     pub(crate) choice: Option<Choice>,
-    /// Any of them; all scenarios without a tag.
+    /// Run only the scenarios with this tag; of several, with any of them
+    #[arg(long = "tag", value_name = "TAG")]
     pub(crate) tags: Vec<String>,
+    /// Run only this share of the scenarios, such as 2/5, on one of five machines
+    #[arg(long, value_name = "NUMBER/OF")]
     pub(crate) shard: Option<Shard>,
 }
 
