@@ -4,15 +4,13 @@
 use std::{fs, os::unix::fs::MetadataExt, path::PathBuf};
 
 use clap::Args;
-use masseter_recording::{Manifest, RunFolder};
-use masseter_report::divergence::{self, Differences};
+use masseter_recording::RunFolder;
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result};
 use rustix::fs::Mode;
-use serde::Serialize;
 
 use crate::BUILD;
-use crate::record::replay::{self, Outcome};
-use crate::run::request::{ControllerKind, Readers, name_of};
+use crate::record::replay::{self, Replayed};
+use crate::run::request::{ControllerKind, Readers};
 
 /// The arguments of `report`.
 #[derive(Debug, Clone, Args)]
@@ -67,7 +65,7 @@ pub(super) struct DiffArgs {
 
 /// Prints the first message in which two recordings differ, and how each difference grows.
 pub(super) fn diff(args: &DiffArgs) -> anyhow::Result<Exit> {
-    divergence::recordings(&args.a, &args.b, args.format)
+    masseter_report::divergence::recordings(&args.a, &args.b, args.format)
 }
 
 /// The arguments of `replay`.
@@ -90,40 +88,22 @@ pub(super) struct ReplayArgs {
     format: Format,
 }
 
-/// A replay as JSON.
-#[derive(Debug, Serialize)]
-struct Replayed {
-    controller: String,
-    clock: String,
-    cycles: u64,
-    open_loop: bool,
-    #[serde(flatten)]
-    differences: Differences,
-}
-
 /// Replays a run, and prints where its controller answers otherwise.
 pub(super) fn replay(args: &ReplayArgs) -> anyhow::Result<Exit> {
-    let Outcome { kind, manifest, cycles, differences } =
-        replay::replay(&args.run, args.controller, &args.set)?;
-    let exit = differences.exit();
-    let (controller, clock) = (name_of(&kind), manifest.clock.clone());
-    let replayed = Replayed { controller, clock, cycles, open_loop: true, differences };
+    let replayed = replay::replay(&args.run, args.controller, &args.set)?;
     result(&match args.format {
-        Format::Human => replayed.in_words(&manifest),
+        Format::Human => in_words(&replayed),
         Format::Json => serde_json::to_string_pretty(&replayed)? + "\n",
     })?;
-    Ok(exit)
+    Ok(replayed.differences.exit())
 }
 
-impl Replayed {
-    fn in_words(&self, manifest: &Manifest) -> String {
-        let Self { controller, clock, cycles, differences, .. } = self;
-        let other = format!("; recorded by masseter {}, replayed by {BUILD}", manifest.masseter);
-        let other = if manifest.masseter == BUILD { "" } else { &other };
-        format!(
-            "{}{cycles} cycles of the {clock} clock by the controller '{controller}', in open loop: the readings are the recorded \
-             ones, whatever the controller answers{other}\n",
-            differences.in_words(["the recording", "the replay"])
-        )
-    }
+fn in_words(Replayed { controller, clock, cycles, differences, recorded_by, .. }: &Replayed) -> String {
+    let other = format!("; recorded by masseter {recorded_by}, replayed by {BUILD}");
+    let other = if recorded_by == BUILD { "" } else { &other };
+    format!(
+        "{}{cycles} cycles of the {clock} clock by the controller '{controller}', in open loop: the readings are the recorded \
+         ones, whatever the controller answers{other}\n",
+        differences.in_words(["the recording", "the replay"])
+    )
 }

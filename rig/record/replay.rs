@@ -6,36 +6,39 @@
 use std::{collections::VecDeque, path::Path};
 
 use anyhow::Context;
-use masseter_controller::process;
 use masseter_plan::{Overrides, scenario_with_overrides};
 use masseter_recording::{Columns, Manifest, Reader, Recorded, RunFolder, definitions, manifest_of};
 use masseter_report::divergence::{Compared, Comparison, Differences, Side};
 use masseter_runtime::control::{Controller, Duties, run_cycle, set_parameters};
 use masseter_runtime::injection::Operator;
-use masseter_runtime::messages::codes::Cause;
 use masseter_runtime::messages::{Event, State};
 use masseter_runtime::named::NamedValues;
 use masseter_runtime::realtime::{Account, Wake};
 use masseter_runtime::schedule::CycleSchedule;
-use masseter_scenario::Scenario;
 use masseter_virtual_time::{Log, LoggedPorts, Sink};
 
 use super::recorded_run::{Deliveries, RecordedRun, ReplayError};
-use crate::run::request::ControllerKind;
+use crate::run::request::{ControllerKind, name_of};
 
 /// What a replay came to.
-pub(crate) struct Outcome {
+#[derive(Debug, serde::Serialize)]
+pub(crate) struct Replayed {
     /// The controller that answered.
-    pub(crate) kind: ControllerKind,
-    /// That of the run.
-    pub(crate) manifest: Manifest,
+    pub(crate) controller: String,
+    /// The clock of the run.
+    pub(crate) clock: String,
     pub(crate) cycles: u64,
+    open_loop: bool,
     /// Between the recording and the replay.
+    #[serde(flatten)]
     pub(crate) differences: Differences,
+    /// The build that recorded the run.
+    #[serde(skip)]
+    pub(crate) recorded_by: String,
 }
 
 /// Replays the run in a folder, by its controller unless another one is named, with changes to keys of the scenario.
-pub(crate) fn replay(run: &Path, kind: Option<ControllerKind>, set: &[String]) -> anyhow::Result<Outcome> {
+pub(crate) fn replay(run: &Path, kind: Option<ControllerKind>, set: &[String]) -> anyhow::Result<Replayed> {
     let folder = RunFolder::open(run)?;
     let path = folder.manifest();
     let manifest = manifest_of(&folder).with_context(|| path.display().to_string())?;
@@ -54,7 +57,8 @@ pub(crate) fn replay(run: &Path, kind: Option<ControllerKind>, set: &[String]) -
         replay.follow(&message)?;
     }
     let (cycles, differences) = replay.into_differences()?;
-    Ok(Outcome { kind, manifest, cycles, differences })
+    let Manifest { clock, masseter: recorded_by, .. } = manifest;
+    Ok(Replayed { controller: name_of(&kind), clock, cycles, open_loop: true, differences, recorded_by })
 }
 
 /// A controller that gets the readings of a recorded run.
@@ -84,12 +88,12 @@ impl Sink for Answers {
 
 impl Replay {
     fn new(
-        scenario: &Scenario,
+        scenario: &masseter_scenario::Scenario,
         kind: ControllerKind,
         manifest: &Manifest,
         run: RecordedRun,
     ) -> anyhow::Result<Self> {
-        let mut controller = process::for_scenario(scenario, kind.builder())?;
+        let mut controller = masseter_controller::process::for_scenario(scenario, kind.builder())?;
         let named = NamedValues::new(controller.declared(), &scenario.parameters).context("[parameters]")?;
         set_parameters(&mut *controller, &named);
         let declared = named.settings().declared();
@@ -162,7 +166,7 @@ impl Replay {
 /// Repeats what somebody did to the controller during the run. What the operator of the scenario does is done twice,
 /// which changes nothing.
 fn intervene(event: &Event, controller: &mut dyn Controller, duties: &Duties, run: &RecordedRun) {
-    if event.cause == Cause::StopRequested.code() {
+    if event.cause == masseter_runtime::messages::codes::Cause::StopRequested.code() {
         controller.request_stop();
     } else if let Some(name) = run.parameter(event.object as usize) {
         // Another controller may have no such parameter.

@@ -19,7 +19,6 @@ use masseter_terminal::status;
 use rustix::process::{Signal, pidfd_send_signal};
 
 use super::child::{Due, Process, Reports};
-use super::controller::Controller;
 
 /// Where the end of a fault is told, ns.
 type End = Receiver<u64>;
@@ -35,7 +34,7 @@ pub(super) struct Strikes {
 
 /// The processes that a fault may act on.
 pub(super) struct Victims<'a> {
-    pub(super) controller: &'a mut Controller,
+    pub(super) controller: &'a mut super::controller::Controller,
     pub(super) plant: &'a mut Process,
     pub(super) recorder: &'a mut Process,
 }

@@ -5,7 +5,6 @@ use std::io::{self, BufReader, Read, Seek};
 use std::{borrow::Cow, collections::BTreeMap, fs::File, path::Path, sync::Arc, vec};
 
 use masseter_runtime::messages::LAYOUT_VERSION;
-use masseter_scenario::input::open_regular;
 use mcap::records::{AttachmentHeader, MessageHeader, Record, SchemaHeader, op};
 use mcap::{Attachment, Channel, Schema};
 
@@ -103,7 +102,7 @@ pub struct Reader<R = BufReader<File>> {
 impl Reader {
     /// Opens a recording.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        Self::new(BufReader::with_capacity(1 << 18, open_regular(path)?))
+        Self::new(BufReader::with_capacity(1 << 18, masseter_scenario::input::open_regular(path)?))
     }
 }
 
@@ -253,9 +252,7 @@ impl<R: Read + Seek> Reader<R> {
     /// Takes an attached file, if its checksum agrees.
     fn take_attachment(&mut self) {
         let body = self.walk.body();
-        if let Ok(Record::Attachment { header, data, crc }) = mcap::parse_record(op::ATTACHMENT, body)
-            && (crc == 0 || crc32fast::hash(&body[..body.len() - 4]) == crc)
-        {
+        if let Ok(Record::Attachment { header, data, .. }) = mcap::parse_record(op::ATTACHMENT, body) {
             let AttachmentHeader { log_time, create_time, name, media_type } = header;
             let data = Cow::Owned(data.into_owned());
             self.attachments.push(Attachment { log_time, create_time, name, media_type, data });
