@@ -3,11 +3,10 @@
 use std::net::{Ipv4Addr, SocketAddr};
 use std::{path::PathBuf, time::Duration};
 
-use clap::Args;
 use masseter_runtime::lifecycle::{Patience, ProcessArguments};
 
 /// The arguments that the supervisor passes to every process of a run. Some verbs are also a user's, without them.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, clap::Args)]
 pub(crate) struct ProcessArgs {
     #[arg(long, hide = true, required = false, requires = "domain")]
     scenario: PathBuf,

@@ -3,14 +3,12 @@
 
 use std::path::PathBuf;
 
-use clap::Args;
-use masseter_recording::new_folder;
 use masseter_recording_verbs::FileFormat;
 use masseter_report::study::{self, By, Study};
 use masseter_terminal::{Exit, result};
 
 /// The arguments of `compare`.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, clap::Args)]
 #[command(
     after_help = "Examples:\n  masseter compare runs/p1-before runs/p1-after runs/p2-before runs/p2-after --out study\n  masseter compare a b --by patient,food.kind"
 )]
@@ -36,7 +34,7 @@ pub(super) struct CompareArgs {
 pub(super) fn compare(args: &CompareArgs) -> anyhow::Result<Exit> {
     let format = args.format.of_tables()?;
     let study = Study::read(&args.runs, args.by.clone(), &args.set)?;
-    new_folder(&args.out)?;
+    masseter_recording::new_folder(&args.out)?;
     let text = study::write(&study, &args.out, &format)?;
     result(&format!("{text}\ncomparison: {}\n", args.out.join("compare.html").display()))?;
     Ok(Exit::Passed)

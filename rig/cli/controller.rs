@@ -2,8 +2,6 @@
 //! controller's process of a run; `masseter param` lists, reads and sets the parameters of a running one; `masseter
 //! signals` lists what `[[require]]` can use.
 
-use std::path::PathBuf;
-
 use anyhow::{Context, bail};
 use clap::{Args, Subcommand};
 use masseter_controller::process;
@@ -13,8 +11,6 @@ use masseter_runtime::named::{Parameter, access};
 use masseter_runtime::{control::Outcome, transport::Domain};
 use masseter_terminal::{Exit, Format, result, result_line};
 
-use super::arguments::ProcessArgs;
-use crate::run::declared_by;
 use crate::run::request::{ControllerChoice, ControllerKind};
 
 /// The arguments of `controller`.
@@ -30,7 +26,7 @@ pub(super) struct ControllerArgs {
     #[arg(long, value_enum, default_value_t)]
     kind: ControllerKind,
     #[command(flatten)]
-    process: Option<ProcessArgs>,
+    process: Option<super::arguments::ProcessArgs>,
 }
 
 /// Runs the controller to the end of its motion or a safe stop.
@@ -140,7 +136,7 @@ fn describe(Parameter { name, unit, about, value, range: [least, most] }: &Param
 )]
 pub(super) struct SignalsArgs {
     /// Scenario file [default: ten seconds of chewing]
-    scenario: Option<PathBuf>,
+    scenario: Option<std::path::PathBuf>,
     /// Whose own signals and parameters are listed too: motion, hold, or a program, which is started and left before the
     /// first cycle [default: motion]
     #[arg(
@@ -162,7 +158,7 @@ pub(super) struct SignalsArgs {
 pub(super) fn signals(args: &SignalsArgs) -> anyhow::Result<Exit> {
     let plan = RunPlan::of_file(read_scenario(args.scenario.as_deref())?, args.scenario.as_deref())?;
     let controller = args.controller.clone().with_map(args.map.as_ref())?;
-    let registry = Registry::new(&plan.scenario, &declared_by(&controller, &plan)?);
+    let registry = Registry::new(&plan.scenario, &crate::run::declared_by(&controller, &plan)?);
     let text = match args.format {
         Format::Json => serde_json::to_string_pretty(registry.signals())? + "\n",
         Format::Human => {

@@ -7,7 +7,6 @@ use anyhow::anyhow;
 use clap::{Args, Subcommand};
 use masseter_campaign::{FaultRow, fault_matrix_in_words, write_fault_matrix};
 use masseter_plan::{RunPlan, read_scenario};
-use masseter_recording::new_folder;
 use masseter_scenario::{FaultDeclaration, FaultKindConfig};
 use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 
@@ -63,7 +62,7 @@ fn play_matrix(MatrixArgs { scenario, out, filter }: &MatrixArgs) -> Result<Exit
     if cases.is_empty() {
         return Err(anyhow!("no kind has this text in its name; see masseter faults list")).usage();
     }
-    new_folder(out).usage()?;
+    masseter_recording::new_folder(out).usage()?;
     let runner = Runner::of_verb(ControllerChoice::default())?;
     status!("{} runs", cases.len());
     let rows = matrix::play(&plan.scenario, cases, &runner)?;

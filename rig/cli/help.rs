@@ -6,8 +6,6 @@ use std::{fmt::Write, fs};
 
 use anyhow::Context;
 use clap::{Args, Command};
-use clap_complete::Shell;
-use clap_mangen::Man;
 use masseter_terminal::{Exit, result, result_line};
 
 use crate::BUILD;
@@ -53,7 +51,7 @@ pub(super) fn with_overview(command: Command) -> Command {
 )]
 pub(super) struct CompletionsArgs {
     /// Shell that completes the command line
-    shell: Shell,
+    shell: clap_complete::Shell,
 }
 
 /// The arguments of `man`.
@@ -90,7 +88,7 @@ pub(super) fn manual(args: &ManArgs, command: Command) -> anyhow::Result<Exit> {
 
 fn page(command: Command) -> anyhow::Result<String> {
     let mut page = Vec::new();
-    Man::new(command).render(&mut page)?;
+    clap_mangen::Man::new(command).render(&mut page)?;
     Ok(String::from_utf8(page)?)
 }
 

@@ -3,17 +3,15 @@
 use std::{fmt::Write, fs, path::PathBuf};
 
 use anyhow::Context;
-use clap::Args;
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, status};
 
-use crate::run::interrupts::Interrupts;
 use crate::vary::identify::{self, Answer, Found, Identified, IdentifyError};
 
 /// Beyond this the rig does not explain the recording.
 const WORST_MISFIT: f64 = 1.2;
 
 /// The arguments of `identify`.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, clap::Args)]
 #[command(
     after_help = "Examples:\n  masseter identify runs/latest --out twin.toml\n  masseter identify runs/latest --set dynamics.platform_mass_kg=0.4"
 )]
@@ -34,7 +32,7 @@ pub(super) struct IdentifyArgs {
 
 /// Prints what a recording says of the robot's parameters.
 pub(super) fn identify(args: &IdentifyArgs) -> Result<Exit, Failure> {
-    let interrupts = Interrupts::of_verb()?;
+    let interrupts = crate::run::interrupts::Interrupts::of_verb()?;
     let answer = match identify::identify(&args.run, &args.set, &interrupts) {
         Err(IdentifyError::Interrupted) => return Ok(Exit::Interrupted),
         answer => answer.usage()?,

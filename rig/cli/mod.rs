@@ -24,10 +24,7 @@ mod why;
 use std::{ffi::OsString, path::PathBuf, process::ExitCode, sync::Arc};
 
 use clap::{ColorChoice, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
-use masseter_recorder::RecorderArgs;
 use masseter_recording_verbs::{ExportArgs, RecordingVerb};
-use masseter_runtime::transport::Domain;
-use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, Failure, OrFailure, choose_colour, in_one_line, result_line, status};
 use rustix::process::umask;
 
@@ -35,23 +32,12 @@ use crate::doctor::{self, DoctorArgs};
 use crate::robot::{self, RobotVerb};
 use crate::run::request::{Readers, RunRequest};
 use crate::{BUILD, run::exec_program, vary::play::play_case};
-use arguments::ProcessArgs;
 use campaign::{CampaignArgs, SearchArgs, ShrinkArgs};
-use can::CanVerb;
-use compare::CompareArgs;
 use controller::{ControllerArgs, ParamVerb, SignalsArgs};
-use faults::FaultsVerb;
 use help::{CompletionsArgs, ManArgs, with_overview};
-use identify::IdentifyArgs;
-use interface::InterfaceArgs;
 use kinematics::{CsvArgs, FkArgs};
-use motion::MotionArgs;
-use plant::PlantArgs;
 use report::{DiffArgs, ReplayArgs, ReportArgs};
 use starter::{InitArgs, NewVerb};
-use storm::StormArgs;
-use test::TestArgs;
-use why::WhyArgs;
 
 const FIRST_STEPS: &str = "\
 First steps:
@@ -92,7 +78,7 @@ enum Verb {
     /// Run a jaw motion through controller, plant and recorder, and judge it
     Run(RunRequest),
     /// Run the scenarios of a folder as a suite of tests
-    Test(TestArgs),
+    Test(test::TestArgs),
     /// Run a scenario with many values of its keys, faults and motions
     Campaign(CampaignArgs),
     /// Search for the values of a campaign's factors that come nearest to a failure
@@ -100,13 +86,13 @@ enum Verb {
     /// Make a failing scenario as small as it can be and still fail
     Shrink(ShrinkArgs),
     /// Play random faults, stimuli and parameters from one seed until a law is broken
-    Storm(StormArgs),
+    Storm(storm::StormArgs),
     /// Find the last instant from which a failed run passes without what acted on it
-    Why(WhyArgs),
+    Why(why::WhyArgs),
     /// Estimate friction, masses, lag and play of the robot from a recording
-    Identify(IdentifyArgs),
+    Identify(identify::IdentifyArgs),
     /// Describe a recorded jaw motion, and whether the rig can play it
-    Motion(MotionArgs),
+    Motion(motion::MotionArgs),
     /// Lay down a scenario, a motion and a CI workflow to start from
     Init(InitArgs),
     /// Forward kinematics of a CSV file: actuator positions to poses
@@ -124,20 +110,20 @@ enum Verb {
     Param(ParamVerb),
     /// List the kinds of faults, or play them all: what detects each
     #[command(subcommand, after_help = "Example:\n  masseter faults matrix")]
-    Faults(FaultsVerb),
+    Faults(faults::FaultsVerb),
     /// List the signals that requirements can use
     Signals(SignalsArgs),
     /// Print the messages as types of C or Python
-    Interface(InterfaceArgs),
+    Interface(interface::InterfaceArgs),
     /// Bring up a robot in steps: inspect, configure, and what follows
     #[command(subcommand, after_help = "Example:\n  masseter robot inspect robot.toml --can can0,can1")]
     Robot(RobotVerb),
     /// Emulate the six drives and the mechanism on real CAN interfaces
-    Plant(PlantArgs),
+    Plant(plant::PlantArgs),
     /// Write the report of a run again, or compare two runs
     Report(ReportArgs),
     /// Compare the jaw motion of persons and sessions: tables, figures for print, a page
-    Compare(CompareArgs),
+    Compare(compare::CompareArgs),
     /// Give the recorded readings of a run to its controller again, and compare the answers
     Replay(ReplayArgs),
     /// Find the first message in which two recordings differ
@@ -151,7 +137,7 @@ enum Verb {
     Recording(RecordingVerb),
     /// Plan the buses, describe the drives (EDS, DBC), serve simulated buses
     #[command(subcommand, after_help = "Example:\n  masseter can plan --rate-hz 1500")]
-    Can(CanVerb),
+    Can(can::CanVerb),
     /// Remove what killed runs left in shared memory
     #[command(after_help = "Example:\n  masseter clean")]
     Clean,
@@ -170,9 +156,9 @@ enum Verb {
     #[command(hide = true)]
     Recorder {
         #[command(flatten)]
-        process: ProcessArgs,
+        process: arguments::ProcessArgs,
         #[command(flatten)]
-        recorder: RecorderArgs,
+        recorder: masseter_recorder::RecorderArgs,
     },
     #[command(hide = true)]
     ExecProgram {
@@ -272,14 +258,14 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
 
 /// Removes the shared memory of killed runs, and lists all domains of this user. Live runs are not touched.
 fn clean() -> anyhow::Result<Exit> {
-    let domains = Domain::all()?;
+    let domains = masseter_runtime::transport::Domain::all()?;
     for domain in &domains {
         match domain.sweep()? {
             Some(swept) => {
                 result_line!(
                     "{}: {} removed from shared memory",
                     domain.id(),
-                    counted(swept.removed as u64, "file")
+                    masseter_scenario::wording::counted(swept.removed as u64, "file")
                 )?;
                 swept.remaining.iter().for_each(|error| status!("masseter: {error}"));
             }

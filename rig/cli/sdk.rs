@@ -4,8 +4,6 @@
 use std::path::{Path, PathBuf};
 use std::{env, fs};
 
-use thiserror::Error;
-
 /// A folder to build with.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Sdk {
@@ -16,7 +14,7 @@ pub(super) enum Sdk {
 }
 
 /// Why there is nothing to build with.
-#[derive(Debug, Error)]
+#[derive(Debug, thiserror::Error)]
 pub(super) enum SdkError {
     #[error(
         "{} is neither Masseter's source nor a folder of scripts/release; give one of them by --sdk",

@@ -10,10 +10,6 @@ use anyhow::{Context, bail};
 use clap::{Args, Subcommand, ValueEnum};
 use masseter_terminal::{Exit, result_line};
 
-use crate::run::runner::word;
-
-use super::sdk::Sdk;
-
 /// The scenario, as a path within the folder.
 const SCENARIO: &str = "scenario.toml";
 /// Path within the folder, content, and what a user needs to know about the file.
@@ -176,7 +172,7 @@ impl Language {
 
 /// Writes the project, and prints the next commands.
 pub(super) fn new(NewVerb::Controller(args): &NewVerb) -> anyhow::Result<Exit> {
-    let sdk = Sdk::new(args.sdk.as_deref())?;
+    let sdk = super::sdk::Sdk::new(args.sdk.as_deref())?;
     let package = match args.lang {
         Language::Rust => sdk.demand_crates().map(|()| PathBuf::new())?,
         Language::Python => sdk.python_package()?,
@@ -275,7 +271,7 @@ fn write_new(path: &Path, content: &str) -> std::io::Result<()> {
 /// A path as a shell takes it for one word that is no option.
 fn quoted(path: &Path) -> String {
     let text = path.display().to_string();
-    word(&if text.starts_with('-') { format!("./{text}") } else { text })
+    crate::run::runner::word(&if text.starts_with('-') { format!("./{text}") } else { text })
 }
 
 /// A path as a program in this folder: a shell searches PATH for a name alone.

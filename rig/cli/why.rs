@@ -3,17 +3,15 @@
 use std::{fmt::Write, path::PathBuf};
 
 use anyhow::Context;
-use clap::Args;
 use masseter_report::why::{Detected, Interval, Left, Why};
 use masseter_runtime::injection::{Injected, Withdrawn};
-use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, Failure, Format, OrFailure, result, status};
 use masseter_virtual_time::Without;
 
 use crate::{run::interrupts::Interrupts, vary::why};
 
 /// The arguments of `why`.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, clap::Args)]
 #[command(
     after_help = "Examples:\n  masseter why runs/latest\n  masseter why runs/latest --without faults.2 --format json"
 )]
@@ -93,7 +91,7 @@ fn in_words(why: &Why) -> String {
     let _ = writeln!(
         text,
         "{} played and judged; --format json has the margin at each",
-        counted(looks.len() as u64, "instant")
+        masseter_scenario::wording::counted(looks.len() as u64, "instant")
     );
     text
 }

@@ -10,14 +10,9 @@ mod resources;
 
 use std::{fmt::Write, fs::OpenOptions};
 
-use clap::Args;
-use masseter_can::is_supported;
 use masseter_machine::{SystemRoot, dma_latency};
 use masseter_runtime::realtime::scheduling::{SchedulingRequest, usable_cores};
-use masseter_scenario::RealtimeConfig;
 use masseter_terminal::{Exit, Format, Tone, result, result_with_tones};
-use rustix::fs::statvfs;
-use serde::Serialize;
 
 use crate::BUILD;
 use finding::{Finding, Level};
@@ -26,7 +21,7 @@ use processors::{fifo, governor, hypervisor, idle, locked_memory, number, try_ou
 use resources::{SHARED_MEMORY, count_rigs, huge_pages, interfaces, other_rigs, room, unsupported};
 
 /// The arguments of `doctor`.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "Example:\n  masseter doctor")]
 pub(crate) struct DoctorArgs {
     /// Format of standard output
@@ -40,7 +35,7 @@ const TONES: [(&str, Tone); 3] = [("ok", Tone::Good), ("warn", Tone::Doubtful), 
 const FORM: u32 = 1;
 
 /// The doctor's report.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize)]
 struct Report {
     form: u32,
     masseter: &'static str,
@@ -75,16 +70,16 @@ pub(crate) fn mending_command() -> Option<String> {
 /// Everything: what the kernel grants, the machine, and what a run shares with others.
 fn findings(root: &SystemRoot) -> Vec<Finding> {
     let nothing = SchedulingRequest { core: None, fifo_priority: None, locked_memory: false };
-    let priority = RealtimeConfig::default().priority;
+    let priority = masseter_scenario::RealtimeConfig::default().priority;
     let fifo_tried = try_out(SchedulingRequest { fifo_priority: Some(priority), ..nothing });
     let memory_tried = try_out(SchedulingRequest { locked_memory: true, ..nothing });
-    let shared = statvfs(SHARED_MEMORY).map(|of| (of.f_blocks, of.f_bavail * of.f_frsize));
+    let shared = rustix::fs::statvfs(SHARED_MEMORY).map(|of| (of.f_blocks, of.f_bavail * of.f_frsize));
     let granted = [
         fifo(root, priority, &fifo_tried).named("SCHED_FIFO"),
         locked_memory(root, &memory_tried).named("locked memory"),
     ];
     let memory = [huge_pages(root).named("huge pages"), room(root, shared.ok()).named("shared memory")];
-    let can = match is_supported() {
+    let can = match masseter_can::is_supported() {
         Ok(()) => vec![
             Finding::ok("supported by the kernel").named("SocketCAN"),
             interfaces(root).named("CAN interfaces"),

@@ -4,15 +4,12 @@ use std::collections::{BTreeMap, VecDeque};
 use std::io::{Read, Seek};
 
 use masseter_judge::{SequenceCheck, TopicFigures};
-use masseter_model::geometry::AXES;
 use masseter_recording::{Columns, Ending, Manifest, ReadError, Reader, Recorded, Topic};
 use masseter_runtime::messages::codes::{Cause, ControllerState, Source};
 use masseter_runtime::messages::{Event, Reading, State};
-use masseter_runtime::named::Declared;
-use masseter_scenario::wording::counted;
 
 /// Bits of a reading whose axes are all fresh.
-const ALL_AXES: u32 = (1 << AXES) - 1;
+const ALL_AXES: u32 = (1 << masseter_model::geometry::AXES) - 1;
 /// Topics without a gap in a run that can be replayed.
 const NEEDED: [Topic; 6] =
     [Topic::Reading, Topic::Command, Topic::State, Topic::Signals, Topic::Parameters, Topic::Event];
@@ -30,7 +27,7 @@ pub(super) enum ReplayError {
     /// Messages of a topic are missing.
     #[error(
         "the recording lacks {} on '{topic}', so what the controller received is unknown: record the run again",
-        counted(*.missing, "message")
+        masseter_scenario::wording::counted(*.missing, "message")
     )]
     Gap {
         /// The topic.
@@ -62,7 +59,7 @@ pub(super) enum ReplayError {
 pub(super) struct RecordedRun {
     /// The fields of its messages.
     pub(super) columns: BTreeMap<Topic, Columns>,
-    declared: Declared,
+    declared: masseter_runtime::named::Declared,
     pub(super) first_state: State,
     /// The last cycle that is whole: that of a process which died may not be.
     last_cycle: u64,

@@ -2,7 +2,6 @@
 //! decided here.
 
 use std::collections::VecDeque;
-use std::ffi::OsString;
 use std::io::{self, Write};
 use std::os::fd::OwnedFd;
 use std::os::unix::process::ExitStatusExt;
@@ -51,7 +50,7 @@ pub(super) struct Process {
 
 impl Process {
     /// Starts this executable as `role`.
-    pub(super) fn spawn(role: &'static str, arguments: &[OsString]) -> anyhow::Result<Self> {
+    pub(super) fn spawn(role: &'static str, arguments: &[std::ffi::OsString]) -> anyhow::Result<Self> {
         let mut child = std::env::current_exe()
             .and_then(|executable| {
                 Command::new(executable)

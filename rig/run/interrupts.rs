@@ -5,7 +5,6 @@ use std::{fs, io, sync::Arc};
 
 use anyhow::Context;
 use masseter_terminal::{Failure, OrFailure};
-use masseter_virtual_time::Requests;
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::{flag, iterator::Signals, low_level::emulate_default_handler};
 
@@ -53,7 +52,7 @@ impl Interrupts {
     }
 }
 
-impl Requests for Interrupts {
+impl masseter_virtual_time::Requests for Interrupts {
     fn is_stop_requested(&self) -> bool {
         self.is_requested.load(Ordering::Relaxed) || self.count.load(Ordering::Relaxed) > 0
     }

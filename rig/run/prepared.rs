@@ -6,7 +6,6 @@ use anyhow::Context;
 use masseter_controller::process::BuildController;
 use masseter_judge::{Analysis, Figures, Verdict};
 use masseter_plan::RunPlan;
-use masseter_recorder::live::ReportServer;
 use masseter_recording::{Ending, FullSpeed, Manifest, RunFolder};
 use masseter_report::Detail;
 use masseter_runtime::transport::{Domain, DomainLock};
@@ -41,7 +40,7 @@ pub(crate) struct PlayedRun {
     /// The summary's room on the disk.
     reserved: File,
     /// For those who watched.
-    report_server: Option<ReportServer>,
+    report_server: Option<masseter_recorder::live::ReportServer>,
     /// Whether the manifest was written.
     written: Result<(), Failure>,
 }

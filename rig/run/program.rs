@@ -15,7 +15,6 @@ use masseter_runtime::lifecycle::attach::{Invitation, RIG_VARIABLE};
 use masseter_runtime::lifecycle::{End, Order, ReportError};
 use masseter_runtime::{conversation::Left, transport::Domain};
 use masseter_terminal::{Exit, status};
-use rustix::net::sockopt::socket_peercred;
 use rustix::process::{
     Pid, Signal, WaitId, WaitIdOptions, getppid, kill_process_group, set_parent_process_death_signal, waitid,
 };
@@ -220,7 +219,7 @@ impl Program {
     fn admit(&mut self) {
         let controller = self.admitted.as_ref().map(|admitted| admitted.process_id);
         if let Some(conversation) = self.reception.admit(controller) {
-            let process_id = socket_peercred(&conversation)
+            let process_id = rustix::net::sockopt::socket_peercred(&conversation)
                 .map_or(0, |peer| peer.pid.as_raw_nonzero().get().cast_unsigned());
             let reports = Reports::of_admitted(conversation);
             self.admitted = Some(Admitted { process_id, reports, exit_by_ns: None });

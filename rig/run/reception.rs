@@ -3,8 +3,6 @@
 //! The rig has one controller. Refusals are counted and said once a second, so that no number of them fills the
 //! screen or delays the supervisor.
 
-use std::os::unix::net::UnixListener;
-
 use anyhow::Context;
 use masseter_runtime::conversation::{Conversation, Left, Limits, Newcomers, line};
 use masseter_runtime::lifecycle::attach::{Answer, Hello, Invitation, socket};
@@ -28,7 +26,7 @@ impl Reception {
     /// Listens at the socket of a domain.
     pub(super) fn open(domain: &Domain, invitation: Invitation) -> anyhow::Result<Self> {
         let path = socket(domain);
-        let newcomers = UnixListener::bind(&path)
+        let newcomers = std::os::unix::net::UnixListener::bind(&path)
             .and_then(|listener| {
                 Newcomers::at(listener.into(), MOST_NEWCOMERS, Limits::newcomer(LONGEST_HELLO))
             })

@@ -3,7 +3,6 @@
 use std::path::{Path, PathBuf};
 use std::{net::SocketAddr, os::unix::fs::PermissionsExt, str::FromStr, time::Duration};
 
-use anyhow::bail;
 use clap::{Args, ValueEnum};
 use masseter_controller::hold_position::HoldPosition;
 use masseter_controller::motion_controller::MotionController;
@@ -11,7 +10,6 @@ use masseter_controller::process::BuildController;
 use masseter_plan::Overrides;
 use masseter_recorder::live;
 use masseter_runtime::lifecycle::Patience;
-use masseter_terminal::Format;
 use rustix::fs::Mode;
 
 use crate::cli::arguments::{Wires, parse_address, parse_cores, parse_duration, parse_patience, parse_wires};
@@ -99,7 +97,7 @@ pub(crate) struct RunRequest {
     pub(super) name: Option<String>,
     /// Format of standard output
     #[arg(long, value_enum, default_value_t, help_heading = WATCH)]
-    pub(super) format: Format,
+    pub(super) format: masseter_terminal::Format,
     /// Exit with 3 unless the kernel grants cores, SCHED_FIFO, locked memory and, if requested, /dev/cpu_dma_latency
     #[arg(long, help_heading = HOW)]
     pub(super) require_rt: bool,
@@ -288,7 +286,7 @@ impl ControllerChoice {
                 arguments.push(map.clone());
                 Ok(Self::Executable(program, arguments))
             }
-            _ => bail!("--map is for --controller fmu:FILE.fmu"),
+            _ => anyhow::bail!("--map is for --controller fmu:FILE.fmu"),
         }
     }
 }

@@ -11,12 +11,9 @@ use masseter_recorder::live;
 use masseter_runtime::injection::{Operator, OperatorError, is_seen_by_controller};
 use masseter_runtime::named::{NameError, NamedValues};
 use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain, usable_cores};
-use masseter_scenario::input::excerpt;
 use masseter_scenario::{CommandFault, FaultKindConfig, ProcessFault, Scenario, StimulusConfig};
-use masseter_terminal::status;
 
 use super::request::{ClockKind, ControllerChoice, RunRequest};
-use crate::doctor;
 
 /// The highest SCHED_FIFO priority.
 const HIGHEST_PRIORITY: u8 = 99;
@@ -93,7 +90,7 @@ impl Unknown {
         };
         let place = path.and_then(|path| scenario.place_of_key(path, &key, entry));
         let place = place.map_or_else(String::new, |place| format!("{place}: "));
-        anyhow::Error::from(self).context(format!("{place}{}", excerpt(&key)))
+        anyhow::Error::from(self).context(format!("{place}{}", masseter_scenario::input::excerpt(&key)))
     }
 }
 
@@ -124,7 +121,7 @@ fn choose_clock(request: &RunRequest, scenario: &Scenario) -> ClockKind {
         matches!(request.controller, ControllerChoice::External | ControllerChoice::Executable(..));
     let say = |what: &str| {
         if !request.quiet {
-            status!("clock: lockstep, {what}");
+            masseter_terminal::status!("clock: lockstep, {what}");
         }
         ClockKind::Lockstep
     };
@@ -160,7 +157,7 @@ fn refusal(scenario: &Scenario) -> Option<String> {
         let tried = thread::spawn(move || obtain(request));
         let obtained = tried.join().expect("asking the kernel does not panic");
         if obtained.core == Some(core) && obtained.fifo_priority != fifo_priority {
-            return Some(format!("SCHED_FIFO is refused; to allow it: {}", doctor::grant_command()));
+            return Some(format!("SCHED_FIFO is refused; to allow it: {}", crate::doctor::grant_command()));
         }
         obtained.refusals.into_iter().next()
     };

@@ -4,8 +4,6 @@ use std::fs::{self, OpenOptions};
 use std::{io, path::Path};
 
 use anyhow::{Context, anyhow, ensure};
-use masseter_plan::RunPlan;
-use masseter_runtime::transport::Domain;
 use rustix::fs::{FallocateFlags, fallocate, statvfs};
 use rustix::process::{Resource, getrlimit};
 
@@ -37,7 +35,7 @@ pub(super) fn check_memory() -> anyhow::Result<()> {
 }
 
 /// Refuses a run whose files have no room in the folder `path`, which need not exist yet.
-pub(super) fn check_disk(path: &Path, plan: &RunPlan) -> anyhow::Result<()> {
+pub(super) fn check_disk(path: &Path, plan: &masseter_plan::RunPlan) -> anyhow::Result<()> {
     let run_s = plan.trajectory.duration_s() + AROUND_MOTION_S;
     let needed = (run_s * f64::from(plan.scenario.rate_hz) * CYCLE_BYTES + REPORT_BYTES) as u64;
     let largest = getrlimit(Resource::Fsize).current.unwrap_or(u64::MAX);
@@ -77,7 +75,7 @@ pub(super) fn check_shared_memory() -> anyhow::Result<()> {
 }
 
 /// Gives every page of the domain's shared memory its place, once all processes have opened their ports.
-pub(super) fn reserve_shared_memory(domain: &Domain) -> anyhow::Result<()> {
+pub(super) fn reserve_shared_memory(domain: &masseter_runtime::transport::Domain) -> anyhow::Result<()> {
     for path in domain.own_shared_memory()? {
         let file = OpenOptions::new().read(true).write(true).open(&path);
         let allocated = file.and_then(|file| allocate(&file, file.metadata()?.len()));

@@ -7,7 +7,6 @@
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
-use std::fs;
 use std::io;
 use std::os::unix::process::ExitStatusExt;
 use std::process::ExitStatus;
@@ -26,7 +25,6 @@ use masseter_runtime::named::Declared;
 use masseter_runtime::realtime::scheduling::Obtained;
 use masseter_runtime::schedule::OFF_TICK_NS;
 use masseter_runtime::transport::{Domain, DomainError, DomainLock, Swept};
-use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 use masseter_virtual_time::Requests;
 
@@ -35,9 +33,7 @@ use super::controller::Controller;
 use super::interrupts::Interrupts;
 use super::loop_watch::LoopWatch;
 use super::request::{ControllerChoice, RunRequest};
-use super::room::reserve_shared_memory;
 use super::strikes::{Strikes, Victims};
-use super::usage::UsageMeter;
 
 /// Polling interval of the processes.
 const POLL: Duration = Duration::from_millis(2);
@@ -98,7 +94,7 @@ pub(super) fn run(
         drop(claim);
         claim = domain.claim().usage()?;
         // The processes that have not started have recorded nothing.
-        let _ = fs::remove_file(folder.recording());
+        let _ = std::fs::remove_file(folder.recording());
     };
     let result = prepared.and_then(|prepared| match prepared {
         Some((mut processes, scheduling)) => {
@@ -166,7 +162,7 @@ impl Processes {
         recorder_arguments.extend(request.quiet.then(|| "--quiet".into()));
         recorder_arguments.extend(request.live.map(|address| format!("--live={address}").into()));
         let invitation = Invitation::new(std::path::absolute(folder.scenario())?, lockstep);
-        let Scenario { controller, can, .. } = &plan.scenario;
+        let masseter_scenario::Scenario { controller, can, .. } = &plan.scenario;
         // It stops the motion, holds it, and switches the drives off.
         let stop_s = controller.stop_ramp_s + controller.hold_s + controller.start_timeout_s;
         Ok(Self {
@@ -202,7 +198,7 @@ impl Processes {
         let mut processes = Self::spawn(plan, folder, domain, request).died()?;
         let Some(scheduling) = processes.wait_ready(interrupts).died()? else { return Ok(None) };
         domain.make_private().usage()?;
-        reserve_shared_memory(domain).usage()?;
+        super::room::reserve_shared_memory(domain).usage()?;
         Ok(Some((processes, scheduling)))
     }
 
@@ -227,7 +223,7 @@ impl Processes {
         self.start(epoch_ns)?;
         let names_and_ids =
             [(RECORDER, self.recorder.id()), (PLANT, self.plant.id()), (CONTROLLER, self.controller.id())];
-        let mut meter = UsageMeter::new(epoch_ns, &names_and_ids);
+        let mut meter = super::usage::UsageMeter::new(epoch_ns, &names_and_ids);
         let (root, period_ns) = (SystemRoot::of_this_machine(), plan.scenario.period_ns());
         let mut loops = LoopWatch::new(root, is_virtual, period_ns, epoch_ns, &names_and_ids[1..]);
         let ending = self.monitor(interrupts, |now_ns| {

@@ -8,8 +8,6 @@ mod fit;
 #[cfg(test)]
 mod tests;
 
-use std::path::Path;
-
 use masseter_judge::{SequenceCheck, TopicFigures};
 use masseter_model::geometry::AXES;
 use masseter_plan::{Overrides, scenario_with_overrides};
@@ -151,7 +149,7 @@ pub(crate) struct Answer {
 
 /// Finds the parameters of a recorded run. The fit begins with the scenario of the run, changed by `set`.
 pub(crate) fn identify(
-    run: &Path,
+    run: &std::path::Path,
     set: &[String],
     requests: &(dyn Requests + Sync),
 ) -> Result<Answer, IdentifyError> {

@@ -3,7 +3,6 @@
 use std::fmt;
 
 use anyhow::anyhow;
-use masseter_campaign::Shrink;
 use masseter_judge::{CheckResult, Figures, Verdict};
 use masseter_runtime::messages::codes::EventKind;
 use masseter_scenario::Scenario;
@@ -19,7 +18,7 @@ pub(crate) fn shrink(runner: &Runner, scenario: &Scenario, reason: &Reason) -> (
         !runner.is_interrupted()
             && runner.play(Source::Scenario(smaller)).is_ok_and(|judged| reason.is_that_of(&judged))
     };
-    let text = Shrink::run(fails, scenario);
+    let text = masseter_campaign::Shrink::run(fails, scenario);
     (text, runs)
 }
 

@@ -21,7 +21,6 @@ use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind};
 use masseter_runtime::named::Declared;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use masseter_scenario::{Scenario, wording::counted};
-use masseter_terminal::Exit;
 use masseter_virtual_time::{Branches, Mark, Requests, Run, Without};
 
 use crate::run::interrupts::Interrupts;
@@ -243,7 +242,7 @@ fn name_of(without: &Without) -> String {
 
 /// Whether a run fails nothing. A fault that never acts is untested, and that is no failure here.
 fn passes(verdict: &Verdict) -> bool {
-    verdict.exit_code == Exit::Passed || verdict.word == "UNTESTED"
+    verdict.exit_code == masseter_terminal::Exit::Passed || verdict.word == "UNTESTED"
 }
 
 /// The results at instants, as intervals without gaps. Neighbours with two results follow each other.

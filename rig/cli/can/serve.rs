@@ -10,19 +10,15 @@ use std::net::{SocketAddr, TcpListener};
 use std::{fmt::Display, io, path::PathBuf};
 
 use anyhow::Context;
-use clap::Args;
 use masseter_can::socketcand::{ECHO, GREETING, OK, Request, RequestError, Requests, write_frame};
 use masseter_can::{Bus, ReceiveError};
 use masseter_model::geometry::AXIS_NAMES;
-use masseter_plan::read_scenario;
 use masseter_plant::emulation::{NodePort, OpenLink};
 use masseter_runtime::clock::{self, SECOND_NS};
 use masseter_runtime::conversation::{Conversation, Left, Limits, Look, Newcomers};
-use masseter_runtime::lifecycle::StopRequest;
 use masseter_scenario::{Scenario, wording::counted};
 use masseter_terminal::{Exit, Refusals, StderrWriter};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use rustix::io::Errno;
 
 use crate::cli::arguments::parse_address;
 
@@ -44,7 +40,7 @@ const MODE_DELAY_NS: u64 = 20_000_000;
 const OPEN_TIMEOUT_NS: u64 = 5 * SECOND_NS;
 
 /// The arguments of `can serve`.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   masseter can serve
@@ -60,8 +56,9 @@ pub(crate) struct ServeArgs {
 
 /// Serves until Ctrl-C.
 pub(crate) fn serve(args: &ServeArgs) -> anyhow::Result<Exit> {
-    let scenario = read_scenario(args.scenario.as_deref())?;
-    let stop = StopRequest::listen_alone().context("cannot listen for signals")?;
+    let scenario = masseter_plan::read_scenario(args.scenario.as_deref())?;
+    let stop =
+        masseter_runtime::lifecycle::StopRequest::listen_alone().context("cannot listen for signals")?;
     let listener = TcpListener::bind(args.listen)
         .with_context(|| format!("cannot listen on {}; choose another address with --listen", args.listen))?;
     let mut server = Server {
@@ -120,7 +117,7 @@ impl Server {
         let mut events: Vec<_> =
             clients.map(|client| PollFd::new(&client.conversation, PollFlags::IN)).collect();
         match poll(&mut events, Some(&STEP)) {
-            Ok(_) | Err(Errno::INTR) => Ok(()),
+            Ok(_) | Err(rustix::io::Errno::INTR) => Ok(()),
             Err(error) => Err(error.into()),
         }
     }

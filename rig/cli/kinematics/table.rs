@@ -7,7 +7,6 @@ use std::io::{self, BufReader, Write};
 use std::{fs::File, iter, path::PathBuf};
 
 use anyhow::{Context, anyhow, ensure};
-use clap::Args;
 use masseter_model::geometry::Mechanism;
 use masseter_scenario::rows::{Line, fields, lines, numbers};
 use masseter_scenario::{input::excerpt, wording::shortest};
@@ -22,7 +21,7 @@ const BATCH_LINES: usize = 16_384;
 const CHUNK_LINES: usize = 256;
 
 /// CSV in, CSV out.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, clap::Args)]
 pub(crate) struct CsvArgs {
     /// CSV file to read [default: standard input]
     #[arg(long, value_name = "FILE.csv")]

@@ -2,7 +2,6 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::bail;
 use masseter_controller::trajectory::{
     Frame, Frames, RecordingSurvey, Trajectory, TrajectoryError, Unit, survey,
 };
@@ -67,7 +66,7 @@ pub(super) struct Suggestion {
 impl Found {
     /// What the file of a scenario's motion holds.
     pub(super) fn new(scenario: &Scenario, path: &Path) -> anyhow::Result<Self> {
-        let MotionConfig::File(file) = &scenario.motion else { bail!("the scenario plays no file") };
+        let MotionConfig::File(file) = &scenario.motion else { anyhow::bail!("the scenario plays no file") };
         let survey = survey(file, &scenario.jaw)?;
         let mechanism = Mechanism::new(&scenario.mechanism)?;
         let judged = Judged::new(scenario, &mechanism);

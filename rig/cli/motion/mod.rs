@@ -7,14 +7,10 @@ mod description;
 mod found;
 mod picture;
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
-use clap::Args;
-use masseter_controller::trajectory::plain_form;
 use masseter_plan::{Overrides, scenario_with_overrides};
-use masseter_scenario::MotionConfig;
 use masseter_terminal::{Exit, Format, Tone, result, result_with_tones};
 
 use self::{description::describe, found::Found};
@@ -23,7 +19,7 @@ const TONES: [(&str, Tone); 4] =
     [("PLAYS", Tone::Good), ("suggest", Tone::Good), ("warning", Tone::Doubtful), ("REFUSED", Tone::Bad)];
 
 /// The arguments of `motion`.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   masseter motion examples/patient.csv --svg patient.svg
@@ -55,8 +51,8 @@ pub(crate) fn motion(args: &MotionArgs) -> anyhow::Result<Exit> {
         Overrides { set: args.set.clone(), trajectory: Some(args.file.clone()), ..Overrides::default() };
     let scenario = scenario_with_overrides(args.scenario.as_deref(), &overrides)?;
     let found = Found::new(&scenario, &args.file)?;
-    if let (Some(path), MotionConfig::File(file)) = (&args.write, &scenario.motion) {
-        write_beside(&args.file, path, &plain_form(file, &scenario.jaw)?)?;
+    if let (Some(path), masseter_scenario::MotionConfig::File(file)) = (&args.write, &scenario.motion) {
+        write_beside(&args.file, path, &masseter_controller::trajectory::plain_form(file, &scenario.jaw)?)?;
     }
     if let Some(path) = &args.svg {
         write_beside(&args.file, path, &picture::svg(&found.survey))?;
@@ -73,5 +69,5 @@ fn write_beside(source: &Path, path: &Path, text: &str) -> anyhow::Result<()> {
     if path.canonicalize().is_ok_and(|path| source.canonicalize().is_ok_and(|source| path == source)) {
         bail!("{} is the file that is read; name another one to write", path.display());
     }
-    fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+    std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
 }

@@ -5,13 +5,11 @@
 //! intervals, so that serial correlation counts. A weak prior, the start with a standard deviation of one scale, bounds
 //! what the recording leaves open. Nothing here knows a rig.
 
-use masseter_judge::student_t;
-use masseter_model::geometry::AXES;
 use nalgebra::{DMatrix, DVector};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};
 
 /// Positions and forces of the axes.
-pub(super) const CHANNELS: usize = 2 * AXES;
+pub(super) const CHANNELS: usize = 2 * masseter_model::geometry::AXES;
 /// The channels in a cycle.
 pub(super) type Row = [f64; CHANNELS];
 
@@ -365,7 +363,7 @@ impl Normal {
             [of_recording, of_playings].map(|noise| &inverse * (noise + &prior) * &inverse);
         let of_one = |(number, of): (usize, &Unknown)| {
             let variance = recorded[(number, number)].max(played[(number, number)]);
-            let half_width = student_t(freedom) * variance.sqrt() * of.scale();
+            let half_width = masseter_judge::student_t(freedom) * variance.sqrt() * of.scale();
             let value = scaled[number] * of.scale();
             Estimate { value, half_width, is_determined: half_width < WIDEST * value.max(of.least) }
         };

@@ -12,7 +12,6 @@ use parquet::column::writer::{ColumnWriter, ColumnWriterImpl};
 use parquet::data_type::{ByteArray, DataType};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
-use parquet::file::properties::WriterProperties;
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::types::{Type, TypePtr};
 
@@ -70,7 +69,7 @@ fn plain(error: ParquetError) -> anyhow::Error {
 fn begin_file(to: File, columns: &[Column]) -> Result<SerializedFileWriter<File>, ParquetError> {
     let fields = columns.iter().map(schema).collect::<Result<Vec<_>, _>>()?;
     let schema = Type::group_type_builder("row").with_fields(fields).build()?;
-    let properties = WriterProperties::builder()
+    let properties = parquet::file::properties::WriterProperties::builder()
         .set_compression(Compression::ZSTD(ZstdLevel::default()))
         .set_key_value_metadata(Some(metadata(columns)))
         .build();

@@ -7,7 +7,6 @@
 use std::{collections::BTreeMap, fmt};
 
 use masseter_runtime::messages::{FrameTap, Message};
-use masseter_scenario::wording::shortest;
 use mcap::Channel;
 
 use crate::{encoding::FrameBatch, topic::Topic};
@@ -88,7 +87,7 @@ impl fmt::Display for Number {
     fn fmt(&self, text: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Self::Whole(value) => value.fmt(text),
-            Self::Real(value) => shortest(*value).fmt(text),
+            Self::Real(value) => masseter_scenario::wording::shortest(*value).fmt(text),
         }
     }
 }

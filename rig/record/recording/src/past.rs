@@ -7,7 +7,6 @@ use std::{io, path::PathBuf};
 
 use masseter_scenario::Scenario;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_bytes};
-use mcap::Attachment;
 use serde_json::{Map, Value};
 
 use crate::manifest::{AT_START, Manifest};
@@ -33,7 +32,7 @@ pub fn manifest_of(folder: &RunFolder) -> io::Result<Manifest> {
 }
 
 /// The first difference from the files at the recording's beginning.
-fn difference(manifest: &Manifest, folder: &RunFolder, attached: &[Attachment]) -> Option<String> {
+fn difference(manifest: &Manifest, folder: &RunFolder, attached: &[mcap::Attachment]) -> Option<String> {
     let data = |name: &str| Some(attached.iter().find(|file| file.name == name)?.data.as_ref());
     let mut scenario = manifest.scenario.clone();
     let mut names = Vec::new();

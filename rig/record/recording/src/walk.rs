@@ -10,7 +10,6 @@ use crc32fast::Hasher;
 use mcap::records::{Record, op};
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::{MAGIC, McapError};
-use serde::Serialize;
 
 /// A record longer than this is taken for damage, bytes; chunks stay far below.
 const LONGEST_RECORD: u64 = 64 << 20;
@@ -25,7 +24,7 @@ const CHUNK_HEAD: usize = HEAD + CHUNK_FIXED + LONGEST_NAME + 8;
 const SCAN_BYTES: usize = 1 << 16;
 
 /// A stretch of the file that could not be read.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Eq, serde::Serialize, thiserror::Error)]
 #[error("bytes {from} to {to}: {reason}")]
 pub struct Damage {
     /// Its first byte.

@@ -10,8 +10,6 @@ use masseter_runtime::messages::codes::ControllerState;
 use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, Tone};
 
-use crate::tables::time_ns;
-
 /// Figures of one channel.
 #[derive(Debug, Clone, Default)]
 struct ChannelFigures {
@@ -60,7 +58,7 @@ impl Survey {
                 if let Recorded::State(state) = message
                     && state.controller_state == ControllerState::Running.code()
                 {
-                    motion_ns.get_or_insert(time_ns(&message));
+                    motion_ns.get_or_insert(crate::tables::time_ns(&message));
                 }
             }
         }

@@ -4,7 +4,6 @@
 //! that Masseter did not write give 2. `recover` ends with 0 once it has saved all readable messages. No verb changes
 //! the recording it reads.
 
-use std::ffi::OsStr;
 use std::fmt::{self, Write as _};
 use std::fs::{self, File};
 use std::io::{BufWriter, Write as _};
@@ -142,7 +141,7 @@ fn write_attached<'a>(
 ) -> anyhow::Result<Vec<(&'a str, usize)>> {
     ensure!(!attachments.is_empty(), "no file is attached to the recording");
     for Attachment { name, .. } in attachments {
-        let is_plain = Path::new(name).file_name() == Some(OsStr::new(name));
+        let is_plain = Path::new(name).file_name() == Some(std::ffi::OsStr::new(name));
         ensure!(is_plain, "a file is attached as '{name}', which is not the plain name of a file");
     }
     fs::create_dir(folder).with_context(|| format!("cannot create {}", folder.display()))?;

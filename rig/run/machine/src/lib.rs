@@ -6,8 +6,6 @@ pub mod counters;
 pub mod dma_latency;
 mod system_root;
 
-use std::fs;
-
 use masseter_recording::MachineInfo;
 use masseter_runtime::realtime::scheduling::allowed_cores;
 
@@ -45,7 +43,7 @@ pub fn describe() -> MachineInfo {
     let uname = rustix::system::uname();
     let [name, release, version] =
         [uname.sysname(), uname.release(), uname.version()].map(std::ffi::CStr::to_string_lossy);
-    let cpuinfo = fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let cpuinfo = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = cpuinfo.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
     MachineInfo {
         cpu: model.map_or_else(|| std::env::consts::ARCH.to_owned(), |(_, name)| name.to_owned()),

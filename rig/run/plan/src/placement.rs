@@ -3,12 +3,8 @@
 //! The motion is moved as a whole, without a turn, to where the axis that comes nearest to an end of its stroke is furthest
 //! from it. Strokes alone count here: speeds and conditioning are those of [`demands`](crate::demands).
 
-use std::cmp::Ordering;
-
 use masseter_controller::trajectory::Trajectory;
 use masseter_model::geometry::{AXES, AXIS_NAMES, Mechanism, Pose, Vec3};
-use nalgebra::Translation3;
-use serde::Serialize;
 
 /// Poses of the motion that are looked at.
 const POSES: u32 = 1000;
@@ -17,7 +13,7 @@ const FIRST_M: f64 = 0.016;
 const LAST_M: f64 = 0.0005;
 
 /// A place of the closed jaw.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Placement {
     /// Shift from the place that the trajectory has now, base frame, m.
     pub shift_m: [f64; 3],
@@ -29,7 +25,7 @@ pub struct Placement {
 
 impl Placement {
     /// By the rest of the stroke, to the micrometre; of two alike the shorter shift is greater.
-    fn compare(&self, other: &Self) -> Ordering {
+    fn compare(&self, other: &Self) -> std::cmp::Ordering {
         let length_m = |placement: &Self| Vec3::from(placement.shift_m).norm();
         self.microns().total_cmp(&other.microns()).then(length_m(other).total_cmp(&length_m(self)))
     }
@@ -80,7 +76,7 @@ fn neighbours() -> impl Iterator<Item = Vec3> {
 fn placement(poses: &[Pose], mechanism: &Mechanism, shift: Vec3) -> Option<Placement> {
     let mut least = Placement { shift_m: shift.into(), margin_m: f64::INFINITY, axis: AXIS_NAMES[0] };
     for pose in poses {
-        let axes_m = mechanism.actuators(&(Translation3::from(shift) * pose)).ok()?.to_axes();
+        let axes_m = mechanism.actuators(&(nalgebra::Translation3::from(shift) * pose)).ok()?.to_axes();
         for axis in 0..AXES {
             let [lowest_m, highest_m] = mechanism.strokes().of_axis(axis);
             let margin_m = (axes_m[axis] - lowest_m).min(highest_m - axes_m[axis]);

@@ -13,10 +13,7 @@ mod sinks;
 use std::{collections::VecDeque, net::SocketAddr, path::PathBuf, time::Duration};
 
 use anyhow::Context;
-use clap::Args;
-use masseter_machine::SystemRoot;
 use masseter_machine::counters::{Sample, Sampler};
-use masseter_model::geometry::Mechanism;
 use masseter_recording::{Backlog, Manifest, Pace, Recorded, Recorder, RunFolder, Scene};
 use masseter_runtime::lifecycle::{ProcessArguments, Start, StopRequest};
 use masseter_runtime::messages::{
@@ -34,7 +31,7 @@ use sinks::{Progress, Sinks};
 const DRAIN_INTERVAL: Duration = Duration::from_millis(10);
 
 /// What the supervisor passes to the recorder.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, clap::Args)]
 pub struct RecorderArgs {
     #[arg(long)]
     recording: PathBuf,
@@ -59,7 +56,7 @@ pub fn record(process_arguments: &ProcessArguments, args: &RecorderArgs) -> anyh
         keep_off(&scenario.realtime.cores);
     }
     let drains = drains_of_topics(&process.node)?;
-    let scene = Scene::new(&Mechanism::new(&scenario.mechanism)?, &scenario.jaw);
+    let scene = Scene::new(&masseter_model::geometry::Mechanism::new(&scenario.mechanism)?, &scenario.jaw);
     let listener = args.live.map(listen_on).transpose()?;
     let pace = if is_lockstep { Pace::Virtual } else { Pace::RealTime };
     let folder = RunFolder::of_recording(&args.recording);
@@ -95,7 +92,7 @@ fn record_in_real_time(
     mut sinks: Sinks,
 ) -> anyhow::Result<Exit> {
     let loops = start.loops.to_vec();
-    let root = SystemRoot::of_this_machine();
+    let root = masseter_machine::SystemRoot::of_this_machine();
     let mut sampler = Sampler::new(root, loops, MACHINE_INTERVAL_NS, start.epoch_ns);
     let mut samples = 0;
     loop {

@@ -1,6 +1,5 @@
 //! A campaign: its file, its base scenario, its points, and the case of each.
 
-use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
@@ -347,7 +346,7 @@ fn latin_hypercube(factors: usize, runs: usize, random: &mut Pcg64) -> Vec<Vec<f
 ///
 /// # Errors
 /// When the file cannot be read.
-pub fn digest_of_program(path: &Path) -> io::Result<String> {
+pub fn digest_of_program(path: &Path) -> std::io::Result<String> {
     Ok(data_encoding::HEXLOWER.encode(&Sha1::digest(std::fs::read(path)?)))
 }
 

@@ -1,7 +1,6 @@
 //! A case: a whole scenario with its number and its identity, and what came of it, as it is kept.
 
 use masseter_judge::{BiteEstimateFigures, Check, CheckResult, Figures, Verdict};
-use masseter_scenario::Scenario;
 use masseter_table::Values;
 use serde::{Deserialize, Serialize};
 
@@ -86,7 +85,7 @@ pub struct Case {
     /// The number added to the seed of the scenario.
     pub more_seed: u64,
     /// The scenario, or why the values lead to none.
-    pub scenario: Result<Scenario, String>,
+    pub scenario: Result<masseter_scenario::Scenario, String>,
 }
 
 /// A requirement or check of a case.

@@ -1,7 +1,6 @@
 //! A factor: a key of the scenario that varies, or a fault that is there or not, and the values that it takes. A
 //! [`Setting`] is one of them.
 
-use masseter_scenario::unit_of;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
@@ -61,7 +60,7 @@ impl Factor {
 
     /// The unit of its numbers: the given one, or the one with which the key ends.
     pub fn unit(&self) -> &str {
-        self.unit.as_deref().or_else(|| unit_of(self.key.as_deref()?)).unwrap_or_default()
+        self.unit.as_deref().or_else(|| masseter_scenario::unit_of(self.key.as_deref()?)).unwrap_or_default()
     }
 
     /// Whether its values are numbers between two ends, as a search needs them.

@@ -8,7 +8,6 @@ use masseter_page::{
 
 use crate::case::{CaseResult, check_names, in_order_of_appearance};
 use crate::factor::{Distribution, Setting};
-use crate::influence::most_influential;
 use crate::report::{Report, WorstCase, percent};
 
 /// Height of a plot, px.
@@ -89,7 +88,7 @@ fn margins(report: &Report<'_>, worst: &[WorstCase]) -> Option<Section> {
 
 /// The verdicts over two factors at a time.
 fn pairs(report: &Report<'_>, worst: &[WorstCase]) -> Option<Section> {
-    let factors = most_influential(report, PAIRED);
+    let factors = crate::influence::most_influential(report, PAIRED);
     let pairs = factors
         .iter()
         .enumerate()

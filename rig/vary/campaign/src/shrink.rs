@@ -8,8 +8,6 @@ use std::path::Path;
 use masseter_scenario::{RequirementConfig, Scenario};
 use toml::{Table, Value};
 
-use crate::factor::bare_number;
-
 /// The lists whose entries are changes of their own.
 const LISTS: [&str; 3] = ["faults", "stimulus", REQUIREMENTS];
 /// The list whose entries stay as they are, or go whole: another limit would be another failure.
@@ -264,7 +262,7 @@ fn at_place_mut<'a>(value: &'a mut Value, place: &[String]) -> Option<&'a mut Va
 
 /// Also one with a unit.
 fn number(value: &Value) -> Option<f64> {
-    bare_number(value).or_else(|| value.as_str()?.split_once(' ')?.0.parse().ok())
+    crate::factor::bare_number(value).or_else(|| value.as_str()?.split_once(' ')?.0.parse().ok())
 }
 
 #[cfg(test)]

@@ -6,12 +6,9 @@ use std::{io::ErrorKind, net::TcpStream, sync::Arc, time::Duration};
 use masseter_recording::{Recorded, Scene, Topic};
 use masseter_runtime::{named::Declared, transport::Domain};
 use rustix::process::{Pid, Signal, getppid, kill_process};
-use serde::Serialize;
 use tungstenite::Error;
 use tungstenite::protocol::frame::{CloseFrame, coding::CloseCode};
 use tungstenite::protocol::{Message, Role, WebSocket, WebSocketConfig};
-
-use super::feed::Feed;
 
 /// Length of a client's queue: almost half a second of every topic at 1 kHz.
 pub(super) const QUEUE: usize = 8192;
@@ -65,7 +62,7 @@ impl Socket {
     }
 
     /// Sends a message as JSON at once.
-    pub(super) fn send_json(&mut self, message: &impl Serialize) -> Result<(), Disconnected> {
+    pub(super) fn send_json(&mut self, message: &impl serde::Serialize) -> Result<(), Disconnected> {
         self.send_text(
             &serde_json::to_string(message).expect("the message holds only strings, numbers and lists"),
         )
@@ -103,7 +100,7 @@ pub(super) struct Host {
     pub scene: Scene,
     pub declared: Arc<Declared>,
     pub domain: Domain,
-    pub feed: Arc<Feed>,
+    pub feed: Arc<super::feed::Feed>,
     pub supervisor: Supervisor,
 }
 

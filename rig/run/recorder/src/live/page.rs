@@ -7,7 +7,6 @@ use std::sync::mpsc::{Receiver, TryRecvError};
 
 use masseter_runtime::clock::{self, SECOND_NS};
 use masseter_runtime::{conversation::Conversation, named::access};
-use serde::Deserialize;
 use serde_json::json;
 use tungstenite::http::StatusCode;
 
@@ -28,7 +27,7 @@ pub(super) fn send_page(mut conversation: Conversation, host: &Host) {
 }
 
 /// What the page asks for.
-#[derive(Debug, PartialEq, Deserialize)]
+#[derive(Debug, PartialEq, serde::Deserialize)]
 #[serde(tag = "op", rename_all = "snake_case")]
 enum Wish {
     /// Another value of a parameter.

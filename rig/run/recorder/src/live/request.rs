@@ -11,8 +11,6 @@ use tungstenite::http::header::{HOST, ORIGIN, SEC_WEBSOCKET_PROTOCOL, UPGRADE};
 use tungstenite::http::uri::{Authority, Uri};
 use tungstenite::http::{HeaderValue, Method, StatusCode};
 
-use super::foxglove::choose_subprotocol;
-
 /// Longest request, bytes.
 pub(super) const LONGEST: usize = 8192;
 /// Most headers of a request.
@@ -98,7 +96,7 @@ fn choose_protocol(request: &Request) -> Option<(Protocol, &'static str)> {
         let offer = offer.to_str().ok()?;
         let is_page = offer.split(',').any(|offer| offer.trim() == PAGE);
         let page = is_page.then_some((Protocol::Page { after }, PAGE));
-        page.or_else(|| choose_subprotocol(offer).map(|name| (Protocol::Foxglove, name)))
+        page.or_else(|| super::foxglove::choose_subprotocol(offer).map(|name| (Protocol::Foxglove, name)))
     })
 }
 
