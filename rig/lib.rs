@@ -10,6 +10,7 @@
 
 mod cli;
 mod doctor;
+mod prelude;
 mod record;
 mod robot;
 mod run;

@@ -1,15 +1,9 @@
 //! `masseter campaign`, `search` and `shrink`: one scenario with many values of its keys, faults and motions.
 
-use std::fs;
-use std::path::{Path, PathBuf};
-
-use anyhow::{Context, anyhow, ensure};
-use clap::Args;
 use masseter_campaign::{Campaign, CampaignFile, CampaignFolder, Factor, Sampler, Search, StopRules};
 use masseter_plan::{Overrides, scenario_with_overrides};
-use masseter_recording::{RunFolder, time_in_names};
-use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 
+use crate::prelude::*;
 use crate::run::request::{ControllerChoice, ControllerKind};
 use crate::run::runner::Runner;
 use crate::vary::play::{Player, plan};
@@ -38,7 +32,7 @@ impl PlayArgs {
     fn begin(&self, campaign: Campaign, file: &Path) -> Result<Player, Failure> {
         let by_time = || {
             let name = file.file_stem().unwrap_or_default().to_string_lossy();
-            Path::new("campaigns").join(format!("{}-{name}", time_in_names()))
+            Path::new("campaigns").join(format!("{}-{name}", masseter_recording::time_in_names()))
         };
         let folder = CampaignFolder::begin(&self.out.clone().unwrap_or_else(by_time), &campaign).usage()?;
         Ok(Player { campaign, folder, runner: Runner::of_verb(ControllerChoice::Own(self.controller))? })
@@ -184,7 +178,7 @@ pub(super) fn shrink(args: &ShrinkArgs) -> Result<Exit, Failure> {
 
 /// The scenario of a file, of a run under any of its names, or of the folder of a case.
 fn scenario_of(path: &Path) -> anyhow::Result<PathBuf> {
-    if let Ok(run) = RunFolder::open(path) {
+    if let Ok(run) = masseter_recording::RunFolder::open(path) {
         return Ok(run.scenario());
     }
     let inside = path.join("scenario.toml");

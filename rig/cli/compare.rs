@@ -1,14 +1,13 @@
 //! `masseter compare`: recordings of several persons and sessions side by side. The statistics are those of
 //! [`masseter_report::study`].
 
-use std::path::PathBuf;
-
 use masseter_recording_verbs::FileFormat;
 use masseter_report::study::{self, By, Study};
-use masseter_terminal::{Exit, result};
+
+use crate::prelude::*;
 
 /// The arguments of `compare`.
-#[derive(Debug, Clone, clap::Args)]
+#[derive(Debug, Clone, Args)]
 #[command(
     after_help = "Examples:\n  masseter compare runs/p1-before runs/p1-after runs/p2-before runs/p2-after --out study\n  masseter compare a b --by patient,food.kind"
 )]

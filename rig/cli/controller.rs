@@ -2,16 +2,14 @@
 //! controller's process of a run; `masseter param` lists, reads and sets the parameters of a running one; `masseter
 //! signals` lists what `[[require]]` can use.
 
-use anyhow::{Context, bail};
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use masseter_controller::process;
 use masseter_judge::{requirements::event_names, signals::Registry};
 use masseter_plan::{RunPlan, read_scenario};
 use masseter_runtime::named::{Parameter, access};
 use masseter_runtime::{control::Outcome, transport::Domain};
-use masseter_terminal::{Exit, Format, result, result_line};
 
-use crate::run::request::{ControllerChoice, ControllerKind};
+use crate::prelude::*;
 
 /// The arguments of `controller`.
 #[derive(Debug, Clone, Args)]
@@ -24,7 +22,7 @@ pub(super) struct ControllerArgs {
     rig: Option<String>,
     /// Which controller
     #[arg(long, value_enum, default_value_t)]
-    kind: ControllerKind,
+    kind: crate::run::request::ControllerKind,
     #[command(flatten)]
     process: Option<super::arguments::ProcessArgs>,
 }
@@ -136,7 +134,7 @@ fn describe(Parameter { name, unit, about, value, range: [least, most] }: &Param
 )]
 pub(super) struct SignalsArgs {
     /// Scenario file [default: ten seconds of chewing]
-    scenario: Option<std::path::PathBuf>,
+    scenario: Option<PathBuf>,
     /// Whose own signals and parameters are listed too: motion, hold, or a program, which is started and left before the
     /// first cycle [default: motion]
     #[arg(
@@ -145,7 +143,7 @@ pub(super) struct SignalsArgs {
         default_value = "motion",
         hide_default_value = true
     )]
-    controller: ControllerChoice,
+    controller: crate::run::request::ControllerChoice,
     /// Which values of the rig the variables of an FMU are [default: the FMU's path with .toml]
     #[arg(long, value_name = "FILE.toml")]
     map: Option<String>,

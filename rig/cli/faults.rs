@@ -1,15 +1,11 @@
 //! `masseter faults`: the kinds of faults, and the coverage of the rig: what detects each fault, and how far the jaw
 //! leaves its path until then.
 
-use std::{fs, path::PathBuf};
-
-use anyhow::anyhow;
-use clap::{Args, Subcommand};
+use clap::Subcommand;
 use masseter_campaign::{FaultRow, fault_matrix_in_words, write_fault_matrix};
-use masseter_plan::{RunPlan, read_scenario};
 use masseter_scenario::{FaultDeclaration, FaultKindConfig};
-use masseter_terminal::{Exit, Failure, OrFailure, result, status};
 
+use crate::prelude::*;
 use crate::{run::request::ControllerChoice, run::runner::Runner, vary::matrix};
 
 /// The verbs of `faults`.
@@ -56,8 +52,8 @@ fn list() -> anyhow::Result<Exit> {
 
 /// Plays the matrix; fails if a fault leads the jaw beyond the limits before somebody detects it.
 fn play_matrix(MatrixArgs { scenario, out, filter }: &MatrixArgs) -> Result<Exit, Failure> {
-    let read = read_scenario(scenario.as_deref()).usage()?;
-    let plan = RunPlan::of_file(read, scenario.as_deref()).usage()?;
+    let read = masseter_plan::read_scenario(scenario.as_deref()).usage()?;
+    let plan = masseter_plan::RunPlan::of_file(read, scenario.as_deref()).usage()?;
     let cases = matrix::cases(&plan, filter.as_deref());
     if cases.is_empty() {
         return Err(anyhow!("no kind has this text in its name; see masseter faults list")).usage();

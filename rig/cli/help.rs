@@ -1,14 +1,12 @@
 //! Help: the overview of all verbs, grouped by what a user wants; `masseter completions` and `masseter man`. All of
 //! it is made from the definition of the command line.
 
-use std::path::{Path, PathBuf};
-use std::{fmt::Write, fs};
+use std::fmt::Write;
 
-use anyhow::Context;
-use clap::{Args, Command};
-use masseter_terminal::{Exit, result, result_line};
+use clap::Command;
 
 use crate::BUILD;
+use crate::prelude::*;
 
 /// What a user wants, and the verbs for that.
 const GROUPS: [(&str, &[&str]); 8] = [

@@ -1,17 +1,15 @@
 //! `masseter identify`: friction, masses, lag and play of a robot from the recording of a run.
 
-use std::{fmt::Write, fs, path::PathBuf};
+use std::fmt::Write;
 
-use anyhow::Context;
-use masseter_terminal::{Exit, Failure, Format, OrFailure, result, status};
-
+use crate::prelude::*;
 use crate::vary::identify::{self, Answer, Found, Identified, IdentifyError};
 
 /// Beyond this the rig does not explain the recording.
 const WORST_MISFIT: f64 = 1.2;
 
 /// The arguments of `identify`.
-#[derive(Debug, Clone, clap::Args)]
+#[derive(Debug, Clone, Args)]
 #[command(
     after_help = "Examples:\n  masseter identify runs/latest --out twin.toml\n  masseter identify runs/latest --set dynamics.platform_mass_kg=0.4"
 )]

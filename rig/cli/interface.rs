@@ -2,11 +2,10 @@
 //!
 //! It prints the files that users include. `tests/interface.rs` makes them from the one table of the messages.
 
-use clap::{Args, ValueEnum};
 use masseter_terminal::{Exit, result};
 
 /// The arguments of `interface`.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "Example:\n  masseter interface c > masseter_messages.h")]
 pub(super) struct InterfaceArgs {
     /// Language
@@ -15,7 +14,7 @@ pub(super) struct InterfaceArgs {
 }
 
 /// A language with generated types.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Language {
     /// C header, for C++ too
     C,

@@ -24,7 +24,6 @@ mod why;
 use std::{ffi::OsString, path::PathBuf, process::ExitCode, sync::Arc};
 
 use clap::{ColorChoice, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
-use masseter_recording_verbs::{ExportArgs, RecordingVerb};
 use masseter_terminal::{Exit, Failure, OrFailure, choose_colour, in_one_line, result_line, status};
 use rustix::process::umask;
 
@@ -35,9 +34,7 @@ use crate::{BUILD, run::exec_program, vary::play::play_case};
 use campaign::{CampaignArgs, SearchArgs, ShrinkArgs};
 use controller::{ControllerArgs, ParamVerb, SignalsArgs};
 use help::{CompletionsArgs, ManArgs, with_overview};
-use kinematics::{CsvArgs, FkArgs};
 use report::{DiffArgs, ReplayArgs, ReportArgs};
-use starter::{InitArgs, NewVerb};
 
 const FIRST_STEPS: &str = "\
 First steps:
@@ -94,17 +91,17 @@ enum Verb {
     /// Describe a recorded jaw motion, and whether the rig can play it
     Motion(motion::MotionArgs),
     /// Lay down a scenario, a motion and a CI workflow to start from
-    Init(InitArgs),
+    Init(starter::InitArgs),
     /// Forward kinematics of a CSV file: actuator positions to poses
-    Fk(FkArgs),
+    Fk(kinematics::FkArgs),
     /// Inverse kinematics of a CSV file: poses to actuator positions
     #[command(after_help = "Example:\n  masseter ik < poses.csv > joints.csv")]
-    Ik(CsvArgs),
+    Ik(kinematics::CsvArgs),
     /// Attach a controller of the rig to a rig that waits for one
     Controller(ControllerArgs),
     /// Lay down a project for your own controller
     #[command(subcommand, after_help = "Example:\n  masseter new controller --lang cpp my_controller")]
-    New(NewVerb),
+    New(starter::NewVerb),
     /// List, read and set the parameters of a running controller
     #[command(subcommand, after_help = "Example:\n  masseter param set integral_gain_per_s=8")]
     Param(ParamVerb),
@@ -131,10 +128,10 @@ enum Verb {
     /// Check whether this machine is fit for real-time runs
     Doctor(DoctorArgs),
     /// Write a recording as tables: Parquet or CSV, with a codebook
-    Export(ExportArgs),
+    Export(masseter_recording_verbs::ExportArgs),
     /// Inspect, verify, recover and thin recordings
     #[command(subcommand, alias = "log", after_help = "Example:\n  masseter recording info runs/latest")]
-    Recording(RecordingVerb),
+    Recording(masseter_recording_verbs::RecordingVerb),
     /// Plan the buses, describe the drives (EDS, DBC), serve simulated buses
     #[command(subcommand, after_help = "Example:\n  masseter can plan --rate-hz 1500")]
     Can(can::CanVerb),

@@ -1,22 +1,21 @@
 //! `masseter plant`: the emulated drives on real CAN interfaces; with the supervisor's hidden arguments, the plant's
 //! process.
 
-use anyhow::{Context, bail};
 use masseter_plant::emulation::{Emulator, EmulatorCounters};
 use masseter_plant::process::{self, Reason};
+use masseter_runtime::lifecycle::StopRequest;
 use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
-use masseter_runtime::{clock, lifecycle::StopRequest};
-use masseter_terminal::{Exit, result_line, status};
 
 use super::arguments::{ProcessArgs, Wires, parse_wires};
+use crate::prelude::*;
 
 /// The arguments of `plant`.
-#[derive(Debug, Clone, clap::Args)]
+#[derive(Debug, Clone, Args)]
 #[command(after_help = "Example:\n  masseter plant --emulate --can can0,can1")]
 pub(super) struct PlantArgs {
     /// Scenario file with drives and mechanism [default: the published rig]
     #[arg(value_name = "SCENARIO")]
-    file: Option<std::path::PathBuf>,
+    file: Option<PathBuf>,
     /// CAN interface of each bus, such as can0,can1
     #[arg(long, value_name = "IF[,IF]", value_parser = parse_wires)]
     can: Option<Wires>,
@@ -59,7 +58,7 @@ fn emulate(args: &PlantArgs) -> anyhow::Result<()> {
     print_counters(emulator.run(&stop)?)
 }
 
-fn resolve(args: &PlantArgs) -> anyhow::Result<masseter_scenario::Scenario> {
+fn resolve(args: &PlantArgs) -> anyhow::Result<Scenario> {
     let scenario = masseter_plan::read_scenario_with(args.file.as_deref(), |scenario| {
         if let Some(wires) = &args.can {
             scenario.can.interfaces.clone_from(&wires.0);

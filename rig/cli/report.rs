@@ -1,14 +1,13 @@
 //! The verbs for past runs: `masseter report` writes a report again or compares two runs, `masseter replay` repeats the
 //! decisions of a controller, `masseter diff` compares two recordings message by message.
 
-use std::{fs, os::unix::fs::MetadataExt, path::PathBuf};
+use std::os::unix::fs::MetadataExt;
 
-use clap::Args;
 use masseter_recording::RunFolder;
-use masseter_terminal::{Exit, Failure, Format, OrFailure, result};
 use rustix::fs::Mode;
 
 use crate::BUILD;
+use crate::prelude::*;
 use crate::record::replay::{self, Replayed};
 use crate::run::request::{ControllerKind, Readers};
 

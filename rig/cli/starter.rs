@@ -4,11 +4,10 @@
 use std::fs::{self, File};
 use std::io::{ErrorKind, Write};
 use std::os::unix::ffi::OsStrExt;
-use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail};
-use clap::{Args, Subcommand, ValueEnum};
-use masseter_terminal::{Exit, result_line};
+use clap::{Subcommand, ValueEnum};
+
+use crate::prelude::*;
 
 /// The scenario, as a path within the folder.
 const SCENARIO: &str = "scenario.toml";

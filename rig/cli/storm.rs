@@ -1,15 +1,13 @@
 //! `masseter storm`: random faults, stimuli and parameters from one seed, until a law is broken.
 
-use std::path::PathBuf;
-
 use masseter_plan::{Overrides, scenario_with_overrides};
-use masseter_terminal::{Exit, Failure, Format, OrFailure, result, status};
 
+use crate::prelude::*;
 use crate::run::request::{ControllerChoice, ControllerKind};
 use crate::vary::storm::{self, Limits, Season};
 
 /// The arguments of `storm`.
-#[derive(Debug, Clone, clap::Args)]
+#[derive(Debug, Clone, Args)]
 #[command(
     after_help = "Examples:\n  masseter storm --seed 7\n  masseter storm chewing.toml --seed 7 --minutes 60 --out storms/7\n\nThe same command with the same --out goes on where it was."
 )]

@@ -1,17 +1,12 @@
 //! `masseter test`: the scenarios of folders as a suite, listed in the form of `cargo test`.
 
-use std::path::{Path, PathBuf};
-
-use anyhow::{Context, ensure};
+use clap::ValueEnum;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
-use clap::{Args, ValueEnum};
 use masseter_recording::time_in_names;
 use masseter_report::suite::{Baseline, Outcome, SuiteReport, TestedScenario};
 use masseter_report::{html_of_suite, junit_of_suite};
-use masseter_runtime::clock;
-use masseter_scenario::wording::counted;
-use masseter_terminal::{Exit, Failure, Format, OrFailure, result, result_line, status};
 
+use crate::prelude::*;
 use crate::run::request::{ClockKind, ControllerChoice};
 use crate::vary::suite::cases::{Case, Cases, Selection};
 use crate::{BUILD, run::runner::Runner, vary::suite::Suite};
@@ -120,7 +115,7 @@ pub(super) fn test(args: &TestArgs) -> Result<Exit, Failure> {
 }
 
 fn write_document(path: &Path, text: &str) -> anyhow::Result<()> {
-    std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+    fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// Refuses a controller that somebody else would have to start, and a suite without one.

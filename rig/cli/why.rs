@@ -1,17 +1,16 @@
 //! `masseter why`: the last instant from which a failed run still passes without what acted on it.
 
-use std::{fmt::Write, path::PathBuf};
+use std::fmt::Write;
 
-use anyhow::Context;
 use masseter_report::why::{Detected, Interval, Left, Why};
 use masseter_runtime::injection::{Injected, Withdrawn};
-use masseter_terminal::{Exit, Failure, Format, OrFailure, result, status};
 use masseter_virtual_time::Without;
 
+use crate::prelude::*;
 use crate::{run::interrupts::Interrupts, vary::why};
 
 /// The arguments of `why`.
-#[derive(Debug, Clone, clap::Args)]
+#[derive(Debug, Clone, Args)]
 #[command(
     after_help = "Examples:\n  masseter why runs/latest\n  masseter why runs/latest --without faults.2 --format json"
 )]
@@ -91,7 +90,7 @@ fn in_words(why: &Why) -> String {
     let _ = writeln!(
         text,
         "{} played and judged; --format json has the margin at each",
-        masseter_scenario::wording::counted(looks.len() as u64, "instant")
+        counted(looks.len() as u64, "instant")
     );
     text
 }

@@ -1,8 +1,6 @@
 //! The cores and what the kernel grants on them: number, frequency governor, idle states, virtualisation; SCHED_FIFO
 //! and locked memory, which are requested from the kernel as a run does.
 
-use std::{env, thread};
-
 use masseter_machine::{SystemRoot, dma_latency, is_virtual};
 use masseter_runtime::realtime::scheduling::{Obtained, SchedulingRequest, obtain};
 
@@ -22,7 +20,7 @@ const SET_GOVERNOR: &str =
 
 /// Requests scheduling in a thread of its own, so that this one keeps its priority.
 pub(super) fn try_out(request: SchedulingRequest) -> Obtained {
-    thread::spawn(move || obtain(request)).join().expect("asking the kernel does not panic")
+    std::thread::spawn(move || obtain(request)).join().expect("asking the kernel does not panic")
 }
 
 pub(super) fn fifo(root: &SystemRoot, priority: u8, obtained: &Obtained) -> Finding {
@@ -61,7 +59,7 @@ pub(super) fn number(root: &SystemRoot, usable: usize, online: &[usize]) -> Find
 /// The command that runs outside the cpuset of the session's control group.
 fn leave_cpuset() -> String {
     // An absolute path and this user's id: sudo has another search path, and files of the run belong to its user.
-    let masseter = env::current_exe().unwrap_or_else(|_| "masseter".into());
+    let masseter = std::env::current_exe().unwrap_or_else(|_| "masseter".into());
     format!("sudo systemd-run --scope --uid=\"$(id -u)\" '{}' run", masseter.display())
 }
 

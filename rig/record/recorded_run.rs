@@ -3,7 +3,6 @@
 use std::collections::{BTreeMap, VecDeque};
 use std::io::{Read, Seek};
 
-use masseter_judge::{SequenceCheck, TopicFigures};
 use masseter_recording::{Columns, Ending, Manifest, ReadError, Reader, Recorded, Topic};
 use masseter_runtime::messages::codes::{Cause, ControllerState, Source};
 use masseter_runtime::messages::{Event, Reading, State};
@@ -73,7 +72,7 @@ impl RecordedRun {
         reader: &mut Reader<R>,
         manifest: &Manifest,
     ) -> Result<Self, ReplayError> {
-        let mut sequence = SequenceCheck::default();
+        let mut sequence = masseter_judge::SequenceCheck::default();
         let mut interventions = VecDeque::new();
         let (mut first_state, mut last_cycles) = (None, [0, 0]);
         while let Some(message) = reader.next_message()? {
@@ -92,7 +91,7 @@ impl RecordedRun {
         }
         let is_needed = |topic: &str| NEEDED.iter().any(|needed| needed.name() == topic);
         let gap = sequence.finish().into_iter().find(|of| of.missing > 0 && is_needed(of.topic));
-        if let Some(TopicFigures { topic, missing, .. }) = gap {
+        if let Some(masseter_judge::TopicFigures { topic, missing, .. }) = gap {
             return Err(ReplayError::Gap { topic, missing });
         }
         let has_died = matches!(manifest.ending, Ending::Died { .. });

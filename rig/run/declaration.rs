@@ -1,8 +1,6 @@
 //! The signals and parameters that a controller declares. A program states them when it is ready: it is started for a
 //! scenario, without plant and recorder, and left before the first cycle.
 
-use std::{fs, path::absolute};
-
 use anyhow::{Context, bail};
 use masseter_plan::RunPlan;
 use masseter_runtime::{lifecycle::attach::Invitation, named::Declared};
@@ -25,10 +23,10 @@ pub(crate) fn declared_by(choice: &ControllerChoice, plan: &RunPlan) -> anyhow::
     let (domain, claim) = reserve_domain(None)?;
     let mut scenario = plan.scenario.clone();
     for (_, file) in scenario.files_mut() {
-        *file = absolute(&file)?;
+        *file = std::path::absolute(&file)?;
     }
     let path = domain.root().join("scenario.toml");
-    fs::write(&path, scenario.to_toml()).with_context(|| format!("cannot write {}", path.display()))?;
+    std::fs::write(&path, scenario.to_toml()).with_context(|| format!("cannot write {}", path.display()))?;
     let start = Controller::start_process(choice, &domain, Invitation::new(path, None), Vec::new(), 0.0);
     // The end of the controller closes its line, by which the program ends.
     let ready = start.and_then(|mut controller| controller.wait_ready(|| false, || None));

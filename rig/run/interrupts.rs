@@ -1,12 +1,12 @@
 //! Requests to end a run: SIGINT, SIGTERM, and SIGHUP of a closed terminal.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::{fs, io, sync::Arc};
+use std::{io, sync::Arc};
 
-use anyhow::Context;
-use masseter_terminal::{Failure, OrFailure};
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
 use signal_hook::{flag, iterator::Signals, low_level::emulate_default_handler};
+
+use crate::prelude::*;
 
 /// The first signal requests an orderly stop, the second an immediate end.
 #[derive(Debug, Clone, Default)]

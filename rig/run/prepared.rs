@@ -1,21 +1,19 @@
 //! A run with its folder: prepared, played into the folder, and reported from there.
 
-use std::{fs::File, path::Path};
+use std::fs::File;
 
-use anyhow::Context;
 use masseter_controller::process::BuildController;
 use masseter_judge::{Analysis, Figures, Verdict};
 use masseter_plan::RunPlan;
 use masseter_recording::{Ending, FullSpeed, Manifest, RunFolder};
 use masseter_report::Detail;
-use masseter_runtime::transport::{Domain, DomainLock};
+use masseter_scenario::FileConfig;
 use masseter_scenario::input::{MOST_KEPT_BYTES, foreign_text, read_bytes, read_text};
-use masseter_scenario::{FileConfig, Scenario};
-use masseter_terminal::{Exit, Failure, OrFailure, status};
 
 use super::request::{ClockKind, ControllerChoice, RunRequest, name_of};
 use super::room::{self, Reserve};
 use super::{interrupts::Interrupts, resolve::resolve, supervisor};
+use crate::prelude::*;
 use crate::{BUILD, doctor, robot::Played};
 
 /// Where runs without `--out` go.
@@ -26,7 +24,7 @@ pub(crate) struct PreparedRun {
     plan: RunPlan,
     request: RunRequest,
     /// None under virtual time.
-    domain: Option<(Domain, DomainLock)>,
+    domain: Option<(masseter_runtime::transport::Domain, masseter_runtime::transport::DomainLock)>,
     folder: RunFolder,
     manifest: Manifest,
     reserve: Reserve,

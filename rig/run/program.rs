@@ -5,22 +5,20 @@
 //! program; it refuses any other with the reason.
 
 use std::os::fd::{AsFd, OwnedFd};
-use std::path::{Path, PathBuf};
 use std::process::{self, Child, Command, ExitStatus, Stdio};
 use std::{ffi::OsString, fs::File, io, os::unix::process::CommandExt};
 
-use anyhow::{Context, bail, ensure};
-use masseter_runtime::clock::{self, SECOND_NS};
+use masseter_runtime::clock::SECOND_NS;
 use masseter_runtime::lifecycle::attach::{Invitation, RIG_VARIABLE};
 use masseter_runtime::lifecycle::{End, Order, ReportError};
 use masseter_runtime::{conversation::Left, transport::Domain};
-use masseter_terminal::{Exit, status};
 use rustix::process::{
     Pid, Signal, WaitId, WaitIdOptions, getppid, kill_process_group, set_parent_process_death_signal, waitid,
 };
 
 use super::child::{KILLED, POLL, READY_TIMEOUT, Readiness, Ready, Reports, describe, open_handle};
 use super::reception::Reception;
+use crate::prelude::*;
 
 /// The hidden verb that ties a process to the supervisor before it becomes the program.
 const EXEC_VERB: &str = "exec-program";

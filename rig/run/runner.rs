@@ -4,19 +4,16 @@
 //! Each run is by itself: a panic is the failure of its own run, and the others go on.
 
 use std::panic::{self, AssertUnwindSafe};
-use std::path::Path;
 
-use anyhow::{Context, anyhow};
 use masseter_controller::process::BuildController;
 use masseter_judge::{Figures, Verdict};
-use masseter_scenario::Scenario;
-use masseter_terminal::{Exit, Failure, OrFailure};
 use masseter_virtual_time::Requests;
 
 use super::interrupts::Interrupts;
 use super::prepared::{PreparedRun, analyse_unrecorded};
 use super::request::{ClockKind, ControllerChoice, RunRequest, name_of};
 use super::resolve::{resolve, resolve_simulated};
+use crate::prelude::*;
 
 /// Plays runs by one controller, until the user interrupts.
 #[derive(Default)]

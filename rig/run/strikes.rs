@@ -4,21 +4,19 @@
 //! In real time the controller's stall is one of them. In simulated time the plant alone makes it, by withholding the
 //! commands.
 
-use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, channel};
-use std::{fs, os::fd::OwnedFd, thread, time::Duration};
+use std::{os::fd::OwnedFd, thread, time::Duration};
 
-use anyhow::{Context, bail};
 use masseter_recording::{ProcessFault, RunFolder};
+use masseter_runtime::lifecycle::Order;
 use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
-use masseter_runtime::{clock, lifecycle::Order};
 use masseter_scenario::{
     CommandFault, FaultConfig, FaultKindConfig, ProcessFault as Kind, RealtimeConfig, Scenario,
 };
-use masseter_terminal::status;
 use rustix::process::{Signal, pidfd_send_signal};
 
 use super::child::{Due, Process, Reports};
+use crate::prelude::*;
 
 /// Where the end of a fault is told, ns.
 type End = Receiver<u64>;

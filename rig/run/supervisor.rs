@@ -12,12 +12,11 @@ use std::os::unix::process::ExitStatusExt;
 use std::process::ExitStatus;
 use std::time::Duration;
 
-use anyhow::Context;
 use masseter_machine::{SystemRoot, dma_latency};
 use masseter_plan::RunPlan;
 use masseter_recorder::live::ReportServer;
 use masseter_recording::{DmaLatency, Ending, Manifest, RunFolder, RunUsage};
-use masseter_runtime::clock::{self, MILLISECOND_NS, SECOND_NS};
+use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_runtime::lifecycle::attach::Invitation;
 use masseter_runtime::lifecycle::{End, Order, Party, Patience, Silence, Start};
 use masseter_runtime::lockstep;
@@ -25,7 +24,6 @@ use masseter_runtime::named::Declared;
 use masseter_runtime::realtime::scheduling::Obtained;
 use masseter_runtime::schedule::OFF_TICK_NS;
 use masseter_runtime::transport::{Domain, DomainError, DomainLock, Swept};
-use masseter_terminal::{Exit, Failure, OrFailure, status};
 use masseter_virtual_time::Requests;
 
 use super::child::{CONTROLLER, KILLED, PLANT, Process, RECORDER, Reports, describe};
@@ -34,6 +32,7 @@ use super::interrupts::Interrupts;
 use super::loop_watch::LoopWatch;
 use super::request::{ControllerChoice, RunRequest};
 use super::strikes::{Strikes, Victims};
+use crate::prelude::*;
 
 /// Polling interval of the processes.
 const POLL: Duration = Duration::from_millis(2);
@@ -94,7 +93,7 @@ pub(super) fn run(
         drop(claim);
         claim = domain.claim().usage()?;
         // The processes that have not started have recorded nothing.
-        let _ = std::fs::remove_file(folder.recording());
+        let _ = fs::remove_file(folder.recording());
     };
     let result = prepared.and_then(|prepared| match prepared {
         Some((mut processes, scheduling)) => {
@@ -162,7 +161,7 @@ impl Processes {
         recorder_arguments.extend(request.quiet.then(|| "--quiet".into()));
         recorder_arguments.extend(request.live.map(|address| format!("--live={address}").into()));
         let invitation = Invitation::new(std::path::absolute(folder.scenario())?, lockstep);
-        let masseter_scenario::Scenario { controller, can, .. } = &plan.scenario;
+        let Scenario { controller, can, .. } = &plan.scenario;
         // It stops the motion, holds it, and switches the drives off.
         let stop_s = controller.stop_ramp_s + controller.hold_s + controller.start_timeout_s;
         Ok(Self {

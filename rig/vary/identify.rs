@@ -8,7 +8,6 @@ mod fit;
 #[cfg(test)]
 mod tests;
 
-use masseter_judge::{SequenceCheck, TopicFigures};
 use masseter_model::geometry::AXES;
 use masseter_plan::{Overrides, scenario_with_overrides};
 use masseter_recording::{FolderError, Manifest, ReadError, Reader, Recorded, RunFolder, Topic};
@@ -176,7 +175,7 @@ struct Played {
 impl Played {
     fn read(folder: &RunFolder, is_in_real_time: bool) -> Result<Self, IdentifyError> {
         let mut reader = Reader::open(&folder.recording())?;
-        let (mut sequence, mut played) = (SequenceCheck::default(), Self::default());
+        let (mut sequence, mut played) = (masseter_judge::SequenceCheck::default(), Self::default());
         let mut late = 0;
         while let Some(message) = reader.next_message()? {
             sequence.take(&message);
@@ -191,7 +190,7 @@ impl Played {
         }
         let needed = [Topic::Reading, Topic::Command].map(Topic::name);
         let gap = sequence.finish().into_iter().find(|of| of.missing > 0 && needed.contains(&of.topic));
-        if let Some(TopicFigures { topic, missing, .. }) = gap {
+        if let Some(masseter_judge::TopicFigures { topic, missing, .. }) = gap {
             return Err(IdentifyError::Gap { topic, missing });
         }
         if is_in_real_time && late > 0 {

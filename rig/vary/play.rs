@@ -4,22 +4,19 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::{fs, path::Path};
 
-use anyhow::{Context, anyhow};
 use clap::ValueEnum;
 use masseter_campaign::{
     Campaign, CampaignFile, CampaignFolder, Case, CaseResult, FolderError, Report, StopRules, WorstCase,
     digest_of_program,
 };
 use masseter_plan::{Overrides, scenario_with_overrides};
-use masseter_runtime::clock;
 use masseter_table::{Format, ParquetProgram};
-use masseter_terminal::{Exit, Failure, OrFailure, in_one_line, status};
+use masseter_terminal::in_one_line;
 
+use crate::prelude::*;
 use crate::run::request::{ClockKind, ControllerChoice, ControllerKind, name_of};
 use crate::run::runner::{Judged, Runner, Source, word};
-use crate::run::{end_with_parent, resolve_simulated};
 
 /// Time between two lines of progress, ns.
 const PROGRESS_EVERY_NS: u64 = 5_000_000_000;
@@ -40,7 +37,7 @@ pub(crate) fn plan(file: &Path, controller: ControllerKind) -> anyhow::Result<Ca
     };
     campaign.check_factors().with_context(|| file.display().to_string())?;
     // A mistake in the scenario itself is in every case.
-    resolve_simulated(&base, campaign.file.scenario.as_deref(), controller.builder())
+    crate::run::resolve_simulated(&base, campaign.file.scenario.as_deref(), controller.builder())
         .context("the scenario of the campaign")?;
     Ok(campaign)
 }
@@ -55,7 +52,7 @@ pub(super) fn this_program() -> anyhow::Result<String> {
 /// campaign judges.
 pub(crate) fn play_case(folder: &Path, number: usize) -> Result<Exit, Failure> {
     // A worker that is killed takes its case along: no orphan computes what the next worker computes again.
-    end_with_parent(rustix::process::getppid()).died()?;
+    crate::run::end_with_parent(rustix::process::getppid()).died()?;
     let (folder, campaign) = CampaignFolder::open(folder).usage()?;
     let kind =
         ControllerKind::from_str(&campaign.controller, false).map_err(|error| anyhow!(error)).usage()?;
@@ -167,7 +164,7 @@ impl Player {
     ) -> Result<Option<(Report<'_>, Vec<WorstCase>)>, Failure> {
         let out = word(&self.folder.path().display().to_string());
         if self.runner.is_interrupted() {
-            let ended = masseter_scenario::wording::counted(results.len() as u64, "case");
+            let ended = counted(results.len() as u64, "case");
             status!("interrupted after {ended}; the same command with --out {out} goes on");
             return Ok(None);
         }

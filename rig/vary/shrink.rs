@@ -2,12 +2,10 @@
 
 use std::fmt;
 
-use anyhow::anyhow;
 use masseter_judge::{CheckResult, Figures, Verdict};
 use masseter_runtime::messages::codes::EventKind;
-use masseter_scenario::Scenario;
-use masseter_terminal::{Exit, Failure, OrFailure};
 
+use crate::prelude::*;
 use crate::run::runner::{Judged, Runner, Source};
 
 /// The smallest scenario that fails for this reason, as TOML, and the number of runs that it took.

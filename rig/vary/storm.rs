@@ -5,19 +5,14 @@
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::path::{Path, PathBuf};
 
-use anyhow::{Context, anyhow, ensure};
-use clap::{Args, value_parser};
+use clap::value_parser;
 use masseter_campaign::{Broken, Law, Shrink, Storms};
-use masseter_runtime::clock;
-use masseter_scenario::Scenario;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
-use masseter_terminal::{Exit, Failure, OrFailure, status};
 use rayon::prelude::*;
-use rustix::fs::{FlockOperation, flock};
 use serde::{Deserialize, Serialize};
 
+use crate::prelude::*;
 use crate::run::runner::{Judged, Runner, Source};
 
 /// Storms between two looks at clock, interrupts and disk, a core.
@@ -110,7 +105,7 @@ impl<'a> Season<'a> {
     ) -> anyhow::Result<Self> {
         fs::create_dir_all(out).with_context(|| out.display().to_string())?;
         let lock = File::create(out.join(LOCK)).with_context(|| out.display().to_string())?;
-        flock(&lock, FlockOperation::NonBlockingLockExclusive)
+        rustix::fs::flock(&lock, rustix::fs::FlockOperation::NonBlockingLockExclusive)
             .map_err(|_| anyhow!("another masseter plays storms in {}", out.display()))?;
         let new = StormLog {
             seed,

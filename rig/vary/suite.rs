@@ -6,23 +6,18 @@
 pub(crate) mod cases;
 pub(crate) mod choice;
 
-use std::fs;
-use std::path::{Path, PathBuf};
-
-use anyhow::anyhow;
 use masseter_judge::Verdict;
 use masseter_report::suite::{Attempt, TestedScenario};
-use masseter_runtime::clock;
-use masseter_terminal::{Exit, Failure, in_one_line, status};
+use masseter_terminal::in_one_line;
 use rayon::prelude::*;
 
 use self::cases::Case;
+use crate::prelude::*;
 use crate::run::request::ClockKind;
-use crate::run::runner::{Runner, Source};
 
 /// How the scenarios of a suite are run.
 pub(crate) struct Suite<'a> {
-    pub(crate) runner: Runner,
+    pub(crate) runner: crate::run::runner::Runner,
     /// The clock of the scenarios that can have it.
     pub(crate) clock: ClockKind,
     /// How often a run with processes is tried again: see [`asks_for_another`].
@@ -97,7 +92,7 @@ impl Suite<'_> {
 
     /// Runs a scenario without a recording. One that does not pass is run again with a recording: the same bytes.
     fn in_virtual_time(&self, case: &Case) -> Attempt {
-        let played = self.runner.play(Source::File(case.file()));
+        let played = self.runner.play(crate::run::runner::Source::File(case.file()));
         let attempt = attempt(played.map(|judged| judged.verdict), None);
         let Ok(unrecorded) = &attempt.verdict else { return attempt };
         if !attempt.is_short(self.allows_untested) || self.runner.is_interrupted() {

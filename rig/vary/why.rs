@@ -8,9 +8,8 @@
 #[cfg(test)]
 mod tests;
 
-use std::{iter, path::Path};
+use std::iter;
 
-use anyhow::{Context, ensure};
 use masseter_controller::process::BuildController;
 use masseter_judge::{Check, CheckResult, EventRecord, Figures, Verdict, Watch, signals::Registry};
 use masseter_plan::{Overrides, RunPlan, scenario_with_overrides};
@@ -20,9 +19,9 @@ use masseter_runtime::injection::{Injected, Withdrawn};
 use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind};
 use masseter_runtime::named::Declared;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
-use masseter_scenario::{Scenario, wording::counted};
 use masseter_virtual_time::{Branches, Mark, Requests, Run, Without};
 
+use crate::prelude::*;
 use crate::run::interrupts::Interrupts;
 use crate::run::request::ControllerKind;
 use crate::run::resolve_simulated;
@@ -242,7 +241,7 @@ fn name_of(without: &Without) -> String {
 
 /// Whether a run fails nothing. A fault that never acts is untested, and that is no failure here.
 fn passes(verdict: &Verdict) -> bool {
-    verdict.exit_code == masseter_terminal::Exit::Passed || verdict.word == "UNTESTED"
+    verdict.exit_code == Exit::Passed || verdict.word == "UNTESTED"
 }
 
 /// The results at instants, as intervals without gaps. Neighbours with two results follow each other.

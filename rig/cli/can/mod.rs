@@ -2,19 +2,17 @@
 
 mod serve;
 
-use std::path::PathBuf;
-
+use clap::Subcommand;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
-use clap::{Args, Subcommand};
 use masseter_can::{BusPlan, PlannedMessage};
 use masseter_model::geometry::AXIS_NAMES;
 use masseter_plan::{read_scenario, read_scenario_with};
 use masseter_plant::{core as plant, description};
 use masseter_runtime::schedule::queued::{QueuedPlan, master_queue, queued_plans};
 use masseter_runtime::schedule::{CycleSchedule, Room, ScheduleError, plans};
-use masseter_scenario::Scenario;
-use masseter_terminal::{Exit, Format, result};
 use serde_json::{Value, json};
+
+use crate::prelude::*;
 
 /// Verbs of `can`.
 #[derive(Debug, Clone, Subcommand)]

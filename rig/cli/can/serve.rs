@@ -7,20 +7,19 @@
 //! No connection blocks: unsent text waits in a buffer of bounded size.
 
 use std::net::{SocketAddr, TcpListener};
-use std::{fmt::Display, io, path::PathBuf};
+use std::{fmt::Display, io};
 
-use anyhow::Context;
 use masseter_can::socketcand::{ECHO, GREETING, OK, Request, RequestError, Requests, write_frame};
 use masseter_can::{Bus, ReceiveError};
 use masseter_model::geometry::AXIS_NAMES;
 use masseter_plant::emulation::{NodePort, OpenLink};
-use masseter_runtime::clock::{self, SECOND_NS};
+use masseter_runtime::clock::SECOND_NS;
 use masseter_runtime::conversation::{Conversation, Left, Limits, Look, Newcomers};
-use masseter_scenario::{Scenario, wording::counted};
-use masseter_terminal::{Exit, Refusals, StderrWriter};
+use masseter_terminal::{Refusals, StderrWriter};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use crate::cli::arguments::parse_address;
+use crate::prelude::*;
 
 /// Clients on one bus at a time.
 const CLIENTS: usize = 8;
@@ -40,7 +39,7 @@ const MODE_DELAY_NS: u64 = 20_000_000;
 const OPEN_TIMEOUT_NS: u64 = 5 * SECOND_NS;
 
 /// The arguments of `can serve`.
-#[derive(Debug, Clone, clap::Args)]
+#[derive(Debug, Clone, Args)]
 #[command(after_help = "\
 Examples:
   masseter can serve

@@ -8,7 +8,6 @@ mod table;
 
 use std::iter;
 
-use clap::{Args, ValueEnum};
 use masseter_controller::kinematics::{
     Assembly, ForwardError, ForwardTracker, Method, Options, Solution, Solutions, nearest_assembly_m, solve,
 };
@@ -49,7 +48,7 @@ const UNIT_TOLERANCE: f64 = 1e-3;
 const NEUTRAL_RAD: [f64; LEGS] = [1.46; LEGS];
 
 /// What `fk` takes.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, clap::Args)]
 #[command(
     after_help = "Examples:\n  masseter fk < actuators.csv > poses.csv\n  masseter fk --all --input actuators.csv"
 )]
@@ -72,7 +71,7 @@ pub(crate) struct FkArgs {
 }
 
 /// Which forward solver.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
 enum Solver {
     /// The certified one of the control loop: the true solution, or the reason why there is none.
     #[default]

@@ -1,7 +1,5 @@
 //! What the file of a recorded motion holds, whether the rig would play it, and with which keys of the scenario it would.
 
-use std::path::{Path, PathBuf};
-
 use masseter_controller::trajectory::{
     Frame, Frames, RecordingSurvey, Trajectory, TrajectoryError, Unit, survey,
 };
@@ -17,7 +15,7 @@ const TIGHT_MM: f64 = 1.0;
 /// What the verb finds.
 #[derive(Debug, Serialize)]
 pub(super) struct Found {
-    pub(super) file: PathBuf,
+    pub(super) file: std::path::PathBuf,
     #[serde(flatten)]
     pub(super) survey: RecordingSurvey,
     #[serde(flatten)]
@@ -65,7 +63,7 @@ pub(super) struct Suggestion {
 
 impl Found {
     /// What the file of a scenario's motion holds.
-    pub(super) fn new(scenario: &Scenario, path: &Path) -> anyhow::Result<Self> {
+    pub(super) fn new(scenario: &Scenario, path: &std::path::Path) -> anyhow::Result<Self> {
         let MotionConfig::File(file) = &scenario.motion else { anyhow::bail!("the scenario plays no file") };
         let survey = survey(file, &scenario.jaw)?;
         let mechanism = Mechanism::new(&scenario.mechanism)?;

@@ -7,19 +7,16 @@ mod description;
 mod found;
 mod picture;
 
-use std::path::{Path, PathBuf};
-
-use anyhow::{Context, bail};
 use masseter_plan::{Overrides, scenario_with_overrides};
-use masseter_terminal::{Exit, Format, Tone, result, result_with_tones};
+use masseter_terminal::{Tone, result_with_tones};
 
-use self::{description::describe, found::Found};
+use crate::prelude::*;
 
 const TONES: [(&str, Tone); 4] =
     [("PLAYS", Tone::Good), ("suggest", Tone::Good), ("warning", Tone::Doubtful), ("REFUSED", Tone::Bad)];
 
 /// The arguments of `motion`.
-#[derive(Debug, Clone, clap::Args)]
+#[derive(Debug, Clone, Args)]
 #[command(after_help = "\
 Examples:
   masseter motion examples/patient.csv --svg patient.svg
@@ -50,7 +47,7 @@ pub(crate) fn motion(args: &MotionArgs) -> anyhow::Result<Exit> {
     let overrides =
         Overrides { set: args.set.clone(), trajectory: Some(args.file.clone()), ..Overrides::default() };
     let scenario = scenario_with_overrides(args.scenario.as_deref(), &overrides)?;
-    let found = Found::new(&scenario, &args.file)?;
+    let found = self::found::Found::new(&scenario, &args.file)?;
     if let (Some(path), masseter_scenario::MotionConfig::File(file)) = (&args.write, &scenario.motion) {
         write_beside(&args.file, path, &masseter_controller::trajectory::plain_form(file, &scenario.jaw)?)?;
     }
@@ -59,7 +56,7 @@ pub(crate) fn motion(args: &MotionArgs) -> anyhow::Result<Exit> {
     }
     match args.format {
         Format::Json => result(&(serde_json::to_string_pretty(&found)? + "\n"))?,
-        Format::Human => result_with_tones(&describe(&found), &TONES)?,
+        Format::Human => result_with_tones(&self::description::describe(&found), &TONES)?,
     }
     Ok(if found.judged.refused.is_none() { Exit::Passed } else { Exit::Failed })
 }
@@ -69,5 +66,5 @@ fn write_beside(source: &Path, path: &Path, text: &str) -> anyhow::Result<()> {
     if path.canonicalize().is_ok_and(|path| source.canonicalize().is_ok_and(|source| path == source)) {
         bail!("{} is the file that is read; name another one to write", path.display());
     }
-    std::fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
+    fs::write(path, text).with_context(|| format!("cannot write {}", path.display()))
 }

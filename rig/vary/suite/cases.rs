@@ -1,14 +1,12 @@
 //! The scenarios of a suite: found in folders, one for each combination of a matrix, named, chosen and shared.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::fs;
-use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail, ensure};
 use masseter_plan::Overrides;
-use masseter_scenario::{MatrixCase, Scenario};
+use masseter_scenario::MatrixCase;
 
 use super::choice::{Choice, Shard};
+use crate::prelude::*;
 use crate::run::needs_processes;
 use crate::run::runner::ScenarioFile;
 
@@ -33,7 +31,7 @@ impl Case {
 }
 
 /// Which scenarios of a suite run.
-#[derive(Debug, Clone, Default, clap::Args)]
+#[derive(Debug, Clone, Default, Args)]
 pub(crate) struct Selection {
     /// Run only the scenarios with these words in their names or as tags, joined by and, or, not and parentheses
     #[arg(short = 'k', long = "filter", value_name = "EXPRESSION")]

@@ -7,7 +7,6 @@
 
 use std::{array, collections::BTreeMap, sync::Arc};
 
-use cdr::{CdrLe, Infinite};
 use masseter_runtime::messages::{CanData, FrameTap};
 use masseter_runtime::named::Declared;
 
@@ -189,7 +188,7 @@ impl Encoder {
         publish_time_ns: u64,
     ) -> Encoded<'_> {
         self.bytes.clear();
-        if cdr::serialize_into::<_, _, _, CdrLe>(&mut self.bytes, message, Infinite).is_err() {
+        if cdr::serialize_into::<_, _, _, cdr::CdrLe>(&mut self.bytes, message, cdr::Infinite).is_err() {
             unreachable!("a buffer that grows takes every number, string and list");
         }
         Encoded { channel, sequence: 0, publish_time_ns, bytes: &self.bytes }

@@ -9,7 +9,6 @@ use mcap::records::{AttachmentHeader, MessageHeader, Record, SchemaHeader, op};
 use mcap::{Attachment, Channel, Schema};
 
 use crate::encoding::{FrameBatch, frames_of};
-use crate::manifest::{AT_START, Manifest};
 use crate::topic::{CDR_LITTLE_ENDIAN, Recorded, Stamps, Topic};
 use crate::walk::{Damage, Step, Walk, unpack_chunk};
 
@@ -150,8 +149,8 @@ impl<R: Read + Seek> Reader<R> {
 
     /// Whether the files attached so far say that the run was in real time. A recording begins with them.
     pub fn is_in_real_time(&self) -> bool {
-        let at_start = self.attachments.iter().find(|file| file.name == AT_START);
-        at_start.is_some_and(|file| Manifest::says_real_time(&file.data))
+        let at_start = self.attachments.iter().find(|file| file.name == crate::manifest::AT_START);
+        at_start.is_some_and(|file| crate::manifest::Manifest::says_real_time(&file.data))
     }
 
     /// Bytes of the file.

@@ -14,7 +14,6 @@ use masseter_scenario::input::read_bytes;
 use mcap::{Attachment, Compression, McapError, WriteOptions, Writer, records::MessageHeader, write::NoSeek};
 
 use crate::encoding::{Channel, Encoded, Encoder, FrameBatch, definition};
-use crate::manifest::{AT_START, Manifest};
 use crate::topic::{Recorded, Topic};
 use crate::{folder::RunFolder, scene::Scene};
 
@@ -155,7 +154,7 @@ impl Recorder {
     /// Creates the recording of a run, with what explains it attached: the scenario, the files that it names, and
     /// the circumstances at the start. A file that is cut short contains them. The scenario says whether it has the CAN frames.
     pub fn of_run(folder: &RunFolder, scene: Scene) -> Result<Self, WriteError> {
-        let mut manifest = Manifest::read(folder)?;
+        let mut manifest = crate::manifest::Manifest::read(folder)?;
         let frames = manifest.scenario.recording.frames.then(FrameBatch::default);
         let mut recorder = Self::with_frames(DurableFile::create(&folder.recording())?, scene, frames)?;
         let scenario = read_bytes(&folder.scenario(), LONGEST_FILE)?;
@@ -166,7 +165,7 @@ impl Recorder {
                 recorder.attach(&name, "text/csv", &read_bytes(&path, LONGEST_FILE)?)?;
             }
         }
-        recorder.attach(AT_START, "application/json", manifest.at_start().as_bytes())?;
+        recorder.attach(crate::manifest::AT_START, "application/json", manifest.at_start().as_bytes())?;
         recorder.flush()?;
         Ok(recorder)
     }

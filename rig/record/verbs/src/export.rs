@@ -8,7 +8,6 @@ use std::path::{Path, PathBuf};
 use std::{collections::BTreeMap, fs};
 
 use anyhow::{Context, anyhow, bail};
-use clap::{Args, ValueEnum};
 use masseter_judge::Analysis;
 use masseter_recording::{Columns, Description, Field, Reader, Recorded, Topic, new_file, new_folder};
 use masseter_report::{CandumpLogs, jaw_cycle_table};
@@ -28,7 +27,7 @@ const JAW_CYCLES: &str = "jaw_cycles";
 const CODEBOOK: &str = "codebook.csv";
 
 /// The arguments of `export`.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, clap::Args)]
 #[command(
     after_help = "Examples:\n  masseter export runs/latest\n  masseter export recording.mcap --format csv --table cycles --table event --out tables"
 )]
@@ -47,7 +46,7 @@ pub struct ExportArgs {
 }
 
 /// The format of the tables.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum FileFormat {
     /// Apache Parquet: types, units in the metadata, a fifth of the bytes
     #[default]

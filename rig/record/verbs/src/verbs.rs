@@ -10,7 +10,6 @@ use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
-use clap::{Args, Subcommand};
 use masseter_recording::{Reader, new_file, recording_at, recover, thin};
 use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, result, result_with_tones};
@@ -19,7 +18,7 @@ use mcap::Attachment;
 use crate::survey::{Survey, TONES};
 
 /// Verbs of `recording`.
-#[derive(Debug, Clone, Subcommand)]
+#[derive(Debug, Clone, clap::Subcommand)]
 pub enum RecordingVerb {
     /// Print topics, schemas, message counts, times and sizes
     #[command(after_help = "Example:\n  masseter recording info runs/latest")]
@@ -62,7 +61,7 @@ pub enum RecordingVerb {
 }
 
 /// The recording to read.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, clap::Args)]
 pub struct RecordingArgs {
     /// Recording, run folder, or a link to either
     #[arg(default_value = "runs/latest")]

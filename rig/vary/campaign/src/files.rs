@@ -6,7 +6,6 @@ use anyhow::Context;
 use masseter_table::{Column, Table, Values, write_table};
 
 use crate::case::{COLUMNS, CaseCheck, CaseResult, check_names};
-use crate::factor::{Factor, Setting};
 use crate::report::{PAGE, Report, WorstCase};
 use crate::{campaign::Campaign, folder::CampaignFolder, page};
 
@@ -39,10 +38,10 @@ fn results_table(campaign: &Campaign, results: &[CaseResult]) -> Table {
 }
 
 /// Numbers where all values of the factor are numbers, otherwise words.
-fn factor_column(results: &[CaseResult], at: usize, factor: &Factor) -> Column {
+fn factor_column(results: &[CaseResult], at: usize, factor: &crate::factor::Factor) -> Column {
     let settings = || results.iter().map(|result| &result.settings[at]);
     let values = if settings().all(|setting| setting.number().is_some()) {
-        Values::Numbers(settings().map(Setting::number).collect())
+        Values::Numbers(settings().map(crate::factor::Setting::number).collect())
     } else {
         Values::Words(settings().map(|setting| Some(setting.word())).collect())
     };

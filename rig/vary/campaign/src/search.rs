@@ -2,7 +2,6 @@
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 
-use clap::{Args, ValueEnum};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
@@ -18,7 +17,7 @@ const SMALLEST: f64 = 1e-10;
 const NARROWEST: f64 = 1e-7;
 
 /// How the next points are chosen.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Method {
     /// By the covariance of the best values so far
     // Hansen, 2016. It begins again elsewhere where it has converged.
@@ -30,7 +29,7 @@ pub enum Method {
 }
 
 /// A search over the unit cube.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::Args)]
 pub struct Search {
     /// The most runs
     #[arg(long, value_name = "N", default_value_t = 500)]

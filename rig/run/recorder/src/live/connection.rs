@@ -1,6 +1,5 @@
 //! What the protocols of clients share: the socket to a client, its queue, and what every client may see and do.
 
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::{io::ErrorKind, net::TcpStream, sync::Arc, time::Duration};
 
 use masseter_recording::{Recorded, Scene, Topic};
@@ -108,7 +107,7 @@ pub(super) struct Host {
 #[derive(Debug, Clone)]
 pub(super) struct Supervisor {
     process: Option<Pid>,
-    is_asked: Arc<AtomicBool>,
+    is_asked: Arc<std::sync::atomic::AtomicBool>,
 }
 
 impl Supervisor {
@@ -119,7 +118,7 @@ impl Supervisor {
 
     /// Asks for an orderly end, once: a second signal would end the run at once.
     pub(super) fn stop(&self) {
-        let is_first = !self.is_asked.swap(true, Ordering::Relaxed);
+        let is_first = !self.is_asked.swap(true, std::sync::atomic::Ordering::Relaxed);
         // A process whose parent has died has another parent, which is no supervisor.
         if let Some(process) = self.process.filter(|_| is_first && getppid() == self.process) {
             // It fails where the supervisor has just ended.

@@ -3,14 +3,12 @@
 //! The recorder ends before the verdict. So it leaves address and secret in the run's private folder, and the supervisor listens
 //! there. A request waits until the report is written.
 
-use std::net::{SocketAddr, TcpListener};
 use std::{fs, time::Duration};
 
 use masseter_runtime::clock::{self, SECOND_NS};
 use masseter_runtime::conversation::{Limits, Newcomers};
 use masseter_runtime::transport::Domain;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
-use serde::{Deserialize, Serialize};
 use tungstenite::http::StatusCode;
 
 use super::request::{self, Wish, http_answer};
@@ -26,9 +24,9 @@ const SERVED_NS: u64 = 15 * SECOND_NS;
 const INTERVAL: Duration = Duration::from_millis(50);
 
 /// Where the page was watched.
-#[derive(Debug, Serialize, Deserialize)]
+#[derive(Debug, serde::Serialize, serde::Deserialize)]
 pub(super) struct Address {
-    pub(super) address: SocketAddr,
+    pub(super) address: std::net::SocketAddr,
     pub(super) secret: String,
 }
 
@@ -50,7 +48,7 @@ impl ReportServer {
     pub fn take_over(domain: &Domain) -> Option<Self> {
         let text = read_text(&domain.root().join(NAME), MOST_KEPT_BYTES).ok()?;
         let Address { address, secret } = serde_json::from_str(&text).ok()?;
-        let listener = TcpListener::bind(address).ok()?;
+        let listener = std::net::TcpListener::bind(address).ok()?;
         let newcomers =
             Newcomers::at(listener.into(), MOST_NEWCOMERS, Limits::newcomer(request::LONGEST)).ok()?;
         Some(Self { newcomers, secret })
