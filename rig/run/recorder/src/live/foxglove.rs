@@ -12,7 +12,8 @@ use masseter_recording::{Channel, Encoded, Encoder, Recorded, Topic, definitions
 use masseter_runtime::messages::Parameters;
 use masseter_runtime::named::access::{self, AccessError};
 use masseter_runtime::named::{Declared, Parameter};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
+use serde_json::{Value, json};
 
 use super::connection::{Disconnected, Host, QUEUE, Queued, Socket, bit};
 
@@ -24,7 +25,7 @@ enum Refusal {
     #[error("the channel does not exist")]
     NoChannel,
     #[error("parameter '{name}' is a number, not {value}")]
-    NoNumber { name: String, value: serde_json::Value },
+    NoNumber { name: String, value: Value },
     #[error("the server offers subscriptions and parameters only")]
     Unsupported,
     #[error("the request is not valid: {0}")]
@@ -60,7 +61,12 @@ impl Session {
             if declared.parameters.is_empty() { &[] } else { &["parameters", "parametersSubscribe"] };
         // Clients discard data of a run with another id.
         let session_id = domain.id();
-        self.socket.send_json(&ServerMessage::ServerInfo { name: "masseter", capabilities, session_id })?;
+        self.socket.send_json(&json!({
+            "op": "serverInfo",
+            "name": "masseter",
+            "capabilities": capabilities,
+            "sessionId": session_id,
+        }))?;
         self.socket.send_json(&advertise(declared))?;
         loop {
             if let Some(text) = self.socket.receive()? {
@@ -111,7 +117,8 @@ impl Session {
             Err(refusal) => {
                 // The levels of the protocol: a warning is 1, an error 2.
                 let level = if matches!(refusal, Refusal::Unsupported) { 1 } else { 2 };
-                self.socket.send_json(&ServerMessage::Status { level, message: refusal.to_string() })
+                self.socket
+                    .send_json(&json!({ "op": "status", "level": level, "message": refusal.to_string() }))
             }
         }
     }
@@ -182,53 +189,12 @@ pub(super) fn choose_subprotocol(offered: &str) -> Option<&'static str> {
     SUBPROTOCOLS.into_iter().find(offers)
 }
 
-#[derive(Serialize)]
-#[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
-enum ServerMessage<'a> {
-    ServerInfo {
-        name: &'a str,
-        capabilities: &'a [&'a str],
-        session_id: &'a str,
-    },
-    Advertise {
-        channels: Vec<Advertised>,
-    },
-    Status {
-        level: u8,
-        message: String,
-    },
-    ParameterValues {
-        parameters: Vec<ParameterValue<'a>>,
-        #[serde(skip_serializing_if = "Option::is_none")]
-        id: Option<String>,
-    },
-}
-
-#[derive(Serialize)]
-#[serde(rename_all = "camelCase")]
-struct Advertised {
-    id: usize,
-    topic: String,
-    encoding: String,
-    schema_name: String,
-    schema_encoding: String,
-    schema: String,
-}
-
-/// A parameter with its value. Without a type, a client takes a whole number for an integer.
-#[derive(Serialize)]
-struct ParameterValue<'a> {
-    name: &'a str,
-    value: f64,
-    r#type: &'static str,
-}
-
 /// A value that a client gives to a parameter; something else than a number is refused.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 struct WantedValue {
     name: String,
     #[serde(default)]
-    value: serde_json::Value,
+    value: Value,
 }
 
 /// A request of a client.
@@ -269,31 +235,34 @@ struct Subscription {
     channel_id: usize,
 }
 
-/// Parameters with their values; `id` is that of the request, if they answer one.
-fn parameter_values<'a>(
-    parameters: impl Iterator<Item = (&'a Parameter, f64)>,
-    id: Option<String>,
-) -> ServerMessage<'a> {
+/// Parameters with their values; `id` is that of the request, if they answer one. Without a type, a client takes a whole
+/// number for an integer.
+fn parameter_values<'a>(parameters: impl Iterator<Item = (&'a Parameter, f64)>, id: Option<String>) -> Value {
     let value =
-        |(known, value): (&'a Parameter, f64)| ParameterValue { name: &known.name, value, r#type: "float64" };
-    ServerMessage::ParameterValues { parameters: parameters.map(value).collect(), id }
+        |(known, value): (&Parameter, _)| json!({ "name": known.name, "value": value, "type": "float64" });
+    let mut values =
+        json!({ "op": "parameterValues", "parameters": parameters.map(value).collect::<Vec<_>>() });
+    if let Some(id) = id {
+        values["id"] = id.into();
+    }
+    values
 }
 
 /// All channels, each with its place as id.
-fn advertise(declared: &Declared) -> ServerMessage<'static> {
-    let channels = definitions(declared);
-    let advertised = |(place, channel): &(Channel, mcap::Channel<'static>)| {
-        let schema = channel.schema.as_ref().expect("every channel of the rig has a schema");
-        Advertised {
-            id: place.place(),
-            topic: channel.topic.clone(),
-            encoding: channel.message_encoding.clone(),
-            schema_name: schema.name.clone(),
-            schema_encoding: schema.encoding.clone(),
-            schema: String::from_utf8_lossy(&schema.data).into_owned(),
-        }
+fn advertise(declared: &Declared) -> Value {
+    let advertised = |(place, channel): (Channel, mcap::Channel<'static>)| {
+        let schema = channel.schema.expect("every channel of the rig has a schema");
+        json!({
+            "id": place.place(),
+            "topic": channel.topic,
+            "encoding": channel.message_encoding,
+            "schemaName": schema.name,
+            "schemaEncoding": schema.encoding,
+            "schema": String::from_utf8_lossy(&schema.data),
+        })
     };
-    ServerMessage::Advertise { channels: channels.iter().map(advertised).collect() }
+    let channels: Vec<_> = definitions(declared).into_iter().map(advertised).collect();
+    json!({ "op": "advertise", "channels": channels })
 }
 
 /// A message of a subscribed channel.
@@ -309,7 +278,6 @@ fn message_data(subscription: u32, log_time_ns: u64, message: &Encoded) -> Vec<u
 #[cfg(test)]
 mod tests {
     use masseter_runtime::named::Signal;
-    use serde_json::{Value, json};
 
     use super::*;
 
@@ -324,7 +292,7 @@ mod tests {
     fn channels_are_advertised_as_recordings_define_them() {
         let signal = Signal { name: "grip".into(), unit: "N".into(), about: String::new() };
         let declared = Declared { signals: vec![signal], ..Declared::default() };
-        let message: Value = serde_json::to_value(advertise(&declared)).unwrap();
+        let message = advertise(&declared);
         assert_eq!(message["op"], "advertise");
         assert!(message.to_string().contains("float64 grip"));
         for (index, (place, definition)) in definitions(&declared).iter().enumerate() {
