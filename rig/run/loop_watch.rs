@@ -41,14 +41,7 @@ impl LoopWatch {
         start_ns: u64,
         processes: &[(&'static str, u32)],
     ) -> Self {
-        let watched = |&(name, process)| WatchedLoop {
-            name,
-            process,
-            thread: None,
-            samples: 0,
-            last: None,
-            kept: KeptIntervals::default(),
-        };
+        let watched = |&(name, process)| WatchedLoop { name, process, ..WatchedLoop::default() };
         let loops = processes.iter().map(watched).collect();
         Self { root, period_ns, is_virtual, next_ns: start_ns, loops }
     }
@@ -81,6 +74,7 @@ impl LoopWatch {
 }
 
 /// The loop of a process.
+#[derive(Default)]
 struct WatchedLoop {
     name: &'static str,
     process: u32,

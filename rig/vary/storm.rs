@@ -165,23 +165,14 @@ impl<'a> Season<'a> {
     }
 
     fn play_one(&self, number: u64) -> Played {
-        let Some(storm) = self.storms.draw(number) else {
-            let by = "the base scenario leaves no valid storm".to_owned();
-            return Played {
-                number,
-                storm: None,
-                word: "REFUSED",
-                acted: Vec::new(),
-                broken: Some(Broken { law: Law::Judged, by }),
-            };
-        };
-        let judged = self.judge(&storm, number.is_multiple_of(RECORDED_EVERY));
-        let (word, acted, broken) = judged;
-        Played { number, storm: Some(storm), word, acted, broken }
+        let storm = self.storms.draw(number);
+        let unplayed = || Outcome::unplayed("REFUSED", "the base scenario leaves no valid storm".to_owned());
+        let with_recording = number.is_multiple_of(RECORDED_EVERY);
+        let outcome = storm.as_ref().map_or_else(unplayed, |storm| self.judge(storm, with_recording));
+        Played { number, storm, outcome }
     }
 
-    /// The word of a storm's verdict, what acted, and the law that it breaks.
-    fn judge(&self, storm: &Scenario, with_recording: bool) -> (&'static str, Vec<String>, Option<Broken>) {
+    fn judge(&self, storm: &Scenario, with_recording: bool) -> Outcome {
         let judged = |Judged { verdict, figures }: Judged| {
             let struck =
                 storm.faults.iter().zip(&figures.faults).filter(|(_, found)| found.struck_ns.is_some());
@@ -191,13 +182,12 @@ impl<'a> Season<'a> {
             acted.dedup();
             let broken = Broken::find(storm, &verdict, &figures)
                 .or_else(|| with_recording.then(|| self.differs(storm, &figures.digest)).flatten());
-            (verdict.word, acted, broken)
+            Outcome { word: verdict.word, acted, broken }
         };
         // Laws that panic break the first law.
-        self.runner.play_and(Source::Scenario(storm), judged).unwrap_or_else(|failure| {
-            let by = format!("{:#}", failure.error);
-            ("DIED", Vec::new(), Some(Broken { law: Law::Judged, by }))
-        })
+        self.runner
+            .play_and(Source::Scenario(storm), judged)
+            .unwrap_or_else(|failure| Outcome::unplayed("DIED", format!("{:#}", failure.error)))
     }
 
     /// How the storm with a recording differs from the one without.
@@ -218,7 +208,7 @@ impl<'a> Season<'a> {
     /// Enters storms into the log; returns whether one broke a law.
     fn count(&mut self, played: Vec<Played>) -> Result<bool, Failure> {
         let before = self.log.violations.len();
-        for Played { number, storm, word, acted, broken } in played {
+        for Played { number, storm, outcome: Outcome { word, acted, broken } } in played {
             self.log.played += 1;
             *self.log.verdicts.entry(word.to_owned()).or_default() += 1;
             for what in acted {
@@ -245,7 +235,7 @@ impl<'a> Season<'a> {
             let with_recording = broken.law == Law::Complete;
             let breaks = |smaller: &Scenario| {
                 let same = |found: Broken| found.law == broken.law;
-                !self.runner.is_interrupted() && self.judge(smaller, with_recording).2.is_some_and(same)
+                !self.runner.is_interrupted() && self.judge(smaller, with_recording).broken.is_some_and(same)
             };
             let text = Shrink::run(breaks, storm);
             let small = self.out.join(format!("storm-{number}-smallest.toml"));
@@ -270,9 +260,20 @@ impl<'a> Season<'a> {
 struct Played {
     number: u64,
     storm: Option<Scenario>,
+    outcome: Outcome,
+}
+
+/// The word of a storm's verdict, what acted, and the law that it breaks.
+struct Outcome {
     word: &'static str,
     acted: Vec<String>,
     broken: Option<Broken>,
+}
+
+impl Outcome {
+    fn unplayed(word: &'static str, by: String) -> Self {
+        Self { word, acted: Vec::new(), broken: Some(Broken { law: Law::Judged, by }) }
+    }
 }
 
 /// The log of a folder; refused where its storms are others.

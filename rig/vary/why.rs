@@ -65,13 +65,8 @@ fn check_entries(scenario: &Scenario, without: &Without) -> anyhow::Result<()> {
         }
     };
     let (faults, stimuli) = (scenario.faults.len(), scenario.stimulus.len());
-    let has_it = match withdrawn {
-        Withdrawn::All => faults + stimuli > 0,
-        Withdrawn::Faults => faults > 0,
-        Withdrawn::Stimuli => stimuli > 0,
-        Withdrawn::One(Injected::Fault(place)) => place < faults,
-        Withdrawn::One(Injected::Stimulus(place)) => place < stimuli,
-    };
+    let mut all = (0..faults).map(Injected::Fault).chain((0..stimuli).map(Injected::Stimulus));
+    let has_it = all.any(|one| withdrawn.holds(one));
     let [faults, stimuli] = [counted(faults as u64, "fault"), format!("{stimuli} stimuli")];
     ensure!(
         has_it,

@@ -111,13 +111,14 @@ fn files_of(path: &Path, left_out: &mut Vec<String>) -> anyhow::Result<Vec<PathB
     let entries: Vec<_> = fs::read_dir(path).and_then(Iterator::collect).with_context(unread)?;
     let mut entries: Vec<_> = entries.into_iter().map(|entry: fs::DirEntry| entry.path()).collect();
     entries.sort();
-    let (files, others): (Vec<_>, Vec<_>) =
-        entries.into_iter().partition(|file| reason_against(file).is_none());
-    let others = others.iter().filter_map(|file| {
-        let reason = reason_against(file).filter(|reason| !reason.is_empty())?;
-        Some(format!("{} ({reason})", file.display()))
-    });
-    left_out.extend(others);
+    let mut files = Vec::new();
+    for file in entries {
+        match reason_against(&file) {
+            None => files.push(file),
+            Some("") => {}
+            Some(reason) => left_out.push(format!("{} ({reason})", file.display())),
+        }
+    }
     ensure!(!files.is_empty(), "{} has no scenario: put *.toml files into it", path.display());
     Ok(files)
 }

@@ -45,7 +45,8 @@ pub enum Withdrawn {
 }
 
 impl Withdrawn {
-    fn holds(self, injected: Injected) -> bool {
+    /// Whether this is one of them.
+    pub fn holds(self, injected: Injected) -> bool {
         match self {
             Self::All => true,
             Self::Faults => matches!(injected, Injected::Fault(_)),
