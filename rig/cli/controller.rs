@@ -1,6 +1,6 @@
 //! The verbs for one's own controller: `masseter controller` attaches one of the rig's to a rig, or is the
 //! controller's process of a run; `masseter param` lists, reads and sets the parameters of a running one; `masseter
-//! signals` lists what `[[require]]` can use.
+//! signals` lists what `[[require]]` can use; `masseter interface` prints the messages for other languages.
 
 use clap::Subcommand;
 use masseter_controller::process;
@@ -176,5 +176,32 @@ pub(super) fn signals(args: &SignalsArgs) -> anyhow::Result<Exit> {
         }
     };
     result(&text)?;
+    Ok(Exit::Passed)
+}
+
+/// The arguments of `interface`.
+#[derive(Debug, Clone, Args)]
+#[command(after_help = "Example:\n  masseter interface c > masseter_messages.h")]
+pub(super) struct InterfaceArgs {
+    /// Language
+    #[arg(value_enum)]
+    language: Language,
+}
+
+/// A language with generated types.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Language {
+    /// C header, for C++ too
+    C,
+    /// Python module: ctypes, NumPy types, enumerations
+    Python,
+}
+
+/// Prints the files that users include. `tests/interface.rs` makes them from the one table of the messages.
+pub(super) fn interface(args: &InterfaceArgs) -> anyhow::Result<Exit> {
+    result(match args.language {
+        Language::C => include_str!("../bindings/interface/masseter_messages.h"),
+        Language::Python => include_str!("../bindings/python/masseter/messages.py"),
+    })?;
     Ok(Exit::Passed)
 }

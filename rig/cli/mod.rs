@@ -9,12 +9,10 @@ mod controller;
 mod faults;
 mod help;
 mod identify;
-mod interface;
 mod kinematics;
 mod motion;
 mod plant;
 mod report;
-mod run;
 mod sdk;
 mod starter;
 mod storm;
@@ -30,9 +28,10 @@ use rustix::process::umask;
 use crate::doctor::{self, DoctorArgs};
 use crate::robot::{self, RobotVerb};
 use crate::run::request::{Readers, RunRequest};
-use crate::{BUILD, run::exec_program, vary::play::play_case};
+use crate::run::{PreparedRun, exec_program, interrupts::Interrupts};
+use crate::{BUILD, vary::play::play_case};
 use campaign::{CampaignArgs, SearchArgs, ShrinkArgs};
-use controller::{ControllerArgs, ParamVerb, SignalsArgs};
+use controller::{ControllerArgs, InterfaceArgs, ParamVerb, SignalsArgs};
 use help::{CompletionsArgs, ManArgs, with_overview};
 use report::{DiffArgs, ReplayArgs, ReportArgs};
 
@@ -111,7 +110,7 @@ enum Verb {
     /// List the signals that requirements can use
     Signals(SignalsArgs),
     /// Print the messages as types of C or Python
-    Interface(interface::InterfaceArgs),
+    Interface(InterfaceArgs),
     /// Bring up a robot in steps: inspect, configure, and what follows
     #[command(subcommand, after_help = "Example:\n  masseter robot inspect robot.toml --can can0,can1")]
     Robot(RobotVerb),
@@ -212,7 +211,7 @@ fn keep_files_private(verb: &Verb) {
 /// Errors lead to exit code 2 unless the verb itself chooses another.
 fn execute(verb: Verb) -> Result<Exit, Failure> {
     match verb {
-        Verb::Run(request) => run::run(&request),
+        Verb::Run(request) => run(&request),
         Verb::Test(args) => test::test(&args),
         Verb::Campaign(args) => campaign::campaign(&args),
         Verb::Search(args) => campaign::search(&args),
@@ -241,7 +240,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Man(args) => help::manual(&args, command()).usage(),
         Verb::New(verb) => starter::new(&verb).usage(),
         Verb::Param(verb) => controller::param(&verb).usage(),
-        Verb::Interface(args) => interface::interface(&args).usage(),
+        Verb::Interface(args) => controller::interface(&args).usage(),
         Verb::Controller(args) => controller::control(args).usage(),
         Verb::Plant(args) => plant::plant(args).usage(),
         Verb::Recorder { process, recorder } => {
@@ -251,6 +250,15 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
             exec_program(supervisor, &path, &arguments).usage()
         }
     }
+}
+
+/// Plays, judges and reports a run.
+fn run(request: &RunRequest) -> Result<Exit, Failure> {
+    let prepared = PreparedRun::new(request)?;
+    let interrupts = Interrupts::of_verb()?;
+    let played = prepared.play(&interrupts);
+    interrupts.restore_default_actions();
+    played?.report()
 }
 
 /// Removes the shared memory of killed runs, and lists all domains of this user. Live runs are not touched.
