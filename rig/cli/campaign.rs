@@ -1,7 +1,6 @@
 //! `masseter campaign`, `search` and `shrink`: one scenario with many values of its keys, faults and motions.
 
 use masseter_campaign::{Campaign, CampaignFile, CampaignFolder, Factor, Sampler, Search, StopRules};
-use masseter_plan::{Overrides, scenario_with_overrides};
 
 use crate::prelude::*;
 use crate::run::request::{ControllerChoice, ControllerKind};
@@ -178,7 +177,7 @@ pub(super) fn shrink(args: &ShrinkArgs) -> Result<Exit, Failure> {
 
 /// The scenario of a file, of a run under any of its names, or of the folder of a case.
 fn scenario_of(path: &Path) -> anyhow::Result<PathBuf> {
-    if let Ok(run) = masseter_recording::RunFolder::open(path) {
+    if let Ok(run) = RunFolder::open(path) {
         return Ok(run.scenario());
     }
     let inside = path.join("scenario.toml");

@@ -2,7 +2,6 @@
 //! controller's process of a run; `masseter param` lists, reads and sets the parameters of a running one; `masseter
 //! signals` lists what `[[require]]` can use; `masseter interface` prints the messages for other languages.
 
-use clap::Subcommand;
 use masseter_controller::process;
 use masseter_judge::{requirements::event_names, signals::Registry};
 use masseter_plan::{RunPlan, read_scenario};
@@ -41,7 +40,7 @@ pub(super) fn control(args: ControllerArgs) -> anyhow::Result<Exit> {
 }
 
 /// The verbs of `param`.
-#[derive(Debug, Clone, Subcommand)]
+#[derive(Debug, Clone, clap::Subcommand)]
 pub(super) enum ParamVerb {
     /// List the parameters with their values, units and ranges
     #[command(after_help = "Example:\n  masseter param list")]

@@ -1,7 +1,6 @@
 //! `masseter faults`: the kinds of faults, and the coverage of the rig: what detects each fault, and how far the jaw
 //! leaves its path until then.
 
-use clap::Subcommand;
 use masseter_campaign::{FaultRow, fault_matrix_in_words, write_fault_matrix};
 use masseter_scenario::{FaultDeclaration, FaultKindConfig};
 
@@ -9,7 +8,7 @@ use crate::prelude::*;
 use crate::{run::request::ControllerChoice, run::runner::Runner, vary::matrix};
 
 /// The verbs of `faults`.
-#[derive(Debug, Clone, Subcommand)]
+#[derive(Debug, Clone, clap::Subcommand)]
 pub(super) enum FaultsVerb {
     /// List the kinds of faults with what they stand for
     #[command(after_help = "Example:\n  masseter faults list")]

@@ -28,12 +28,7 @@ use rustix::process::umask;
 use crate::doctor::{self, DoctorArgs};
 use crate::robot::{self, RobotVerb};
 use crate::run::request::{Readers, RunRequest};
-use crate::run::{PreparedRun, exec_program, interrupts::Interrupts};
-use crate::{BUILD, vary::play::play_case};
-use campaign::{CampaignArgs, SearchArgs, ShrinkArgs};
 use controller::{ControllerArgs, InterfaceArgs, ParamVerb, SignalsArgs};
-use help::{CompletionsArgs, ManArgs, with_overview};
-use report::{DiffArgs, ReplayArgs, ReportArgs};
 
 const FIRST_STEPS: &str = "\
 First steps:
@@ -49,7 +44,7 @@ Exit codes of every verb: 0 passed, 1 a check failed or was not tested, 2 wrong 
 #[derive(Debug, Parser)]
 #[command(
     name = "masseter",
-    version = BUILD,
+    version = crate::BUILD,
     max_term_width = 100,
     after_help = FIRST_STEPS,
     after_long_help = format!("{FIRST_STEPS}\n\n{EXIT_CODES}")
@@ -76,11 +71,11 @@ enum Verb {
     /// Run the scenarios of a folder as a suite of tests
     Test(test::TestArgs),
     /// Run a scenario with many values of its keys, faults and motions
-    Campaign(CampaignArgs),
+    Campaign(campaign::CampaignArgs),
     /// Search for the values of a campaign's factors that come nearest to a failure
-    Search(SearchArgs),
+    Search(campaign::SearchArgs),
     /// Make a failing scenario as small as it can be and still fail
-    Shrink(ShrinkArgs),
+    Shrink(campaign::ShrinkArgs),
     /// Play random faults, stimuli and parameters from one seed until a law is broken
     Storm(storm::StormArgs),
     /// Find the last instant from which a failed run passes without what acted on it
@@ -117,13 +112,13 @@ enum Verb {
     /// Emulate the six drives and the mechanism on real CAN interfaces
     Plant(plant::PlantArgs),
     /// Write the report of a run again, or compare two runs
-    Report(ReportArgs),
+    Report(report::ReportArgs),
     /// Compare the jaw motion of persons and sessions: tables, figures for print, a page
     Compare(compare::CompareArgs),
     /// Give the recorded readings of a run to its controller again, and compare the answers
-    Replay(ReplayArgs),
+    Replay(report::ReplayArgs),
     /// Find the first message in which two recordings differ
-    Diff(DiffArgs),
+    Diff(report::DiffArgs),
     /// Check whether this machine is fit for real-time runs
     Doctor(DoctorArgs),
     /// Write a recording as tables: Parquet or CSV, with a codebook
@@ -138,9 +133,9 @@ enum Verb {
     #[command(after_help = "Example:\n  masseter clean")]
     Clean,
     /// Print the completions of the command line for a shell
-    Completions(CompletionsArgs),
+    Completions(help::CompletionsArgs),
     /// Write manual pages
-    Man(ManArgs),
+    Man(help::ManArgs),
     /// Run one case of a campaign, for a scheduler
     #[command(hide = true)]
     CampaignCase {
@@ -187,7 +182,7 @@ pub fn main() -> ExitCode {
 
 /// The whole command line.
 fn command() -> Command {
-    with_overview(Cli::command())
+    help::with_overview(Cli::command())
 }
 
 /// Lets no other user read new files, unless `run --readable-by` allows it. The processes of a run inherit that, and
@@ -219,7 +214,7 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
         Verb::Storm(args) => storm::storm(&args),
         Verb::Why(args) => why::why(&args),
         Verb::Identify(args) => identify::identify(&args),
-        Verb::CampaignCase { folder, number } => play_case(&folder, number),
+        Verb::CampaignCase { folder, number } => crate::vary::play::play_case(&folder, number),
         Verb::Motion(args) => motion::motion(&args).usage(),
         Verb::Init(args) => starter::init(&args).usage(),
         Verb::Faults(verb) => faults::execute(&verb),
@@ -247,15 +242,15 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
             masseter_recorder::record(&process.process_arguments(), &recorder).usage()
         }
         Verb::ExecProgram { supervisor, path, arguments } => {
-            exec_program(supervisor, &path, &arguments).usage()
+            crate::run::exec_program(supervisor, &path, &arguments).usage()
         }
     }
 }
 
 /// Plays, judges and reports a run.
 fn run(request: &RunRequest) -> Result<Exit, Failure> {
-    let prepared = PreparedRun::new(request)?;
-    let interrupts = Interrupts::of_verb()?;
+    let prepared = crate::run::PreparedRun::new(request)?;
+    let interrupts = crate::run::interrupts::Interrupts::of_verb()?;
     let played = prepared.play(&interrupts);
     interrupts.restore_default_actions();
     played?.report()

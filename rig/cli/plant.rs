@@ -3,7 +3,6 @@
 
 use masseter_plant::emulation::{Emulator, EmulatorCounters};
 use masseter_plant::process::{self, Reason};
-use masseter_runtime::lifecycle::StopRequest;
 use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
 
 use super::arguments::{ProcessArgs, Wires, parse_wires};
@@ -45,7 +44,8 @@ pub(super) fn plant(args: PlantArgs) -> anyhow::Result<Exit> {
 
 fn emulate(args: &PlantArgs) -> anyhow::Result<()> {
     let scenario = resolve(args)?;
-    let stop = StopRequest::listen_alone().context("cannot listen for signals")?;
+    let stop =
+        masseter_runtime::lifecycle::StopRequest::listen_alone().context("cannot listen for signals")?;
     let emulator = Emulator::open(&scenario, clock::now_ns()).context("the drives cannot be emulated")?;
     let realtime = &scenario.realtime;
     let obtained = obtain(SchedulingRequest {

@@ -3,7 +3,6 @@
 
 use std::os::unix::fs::MetadataExt;
 
-use masseter_recording::RunFolder;
 use rustix::fs::Mode;
 
 use crate::BUILD;

@@ -1,7 +1,5 @@
 //! `masseter storm`: random faults, stimuli and parameters from one seed, until a law is broken.
 
-use masseter_plan::{Overrides, scenario_with_overrides};
-
 use crate::prelude::*;
 use crate::run::request::{ControllerChoice, ControllerKind};
 use crate::vary::storm::{self, Limits, Season};

@@ -3,11 +3,9 @@
 //!
 //! The loop is open: a different command reaches no robot, so the readings stay those of the run.
 
-use std::{collections::VecDeque, path::Path};
+use std::collections::VecDeque;
 
-use anyhow::Context;
-use masseter_plan::{Overrides, scenario_with_overrides};
-use masseter_recording::{Columns, Manifest, Reader, Recorded, RunFolder, definitions, manifest_of};
+use masseter_recording::{Columns, Reader, Recorded, definitions, manifest_of};
 use masseter_report::divergence::{Compared, Comparison, Differences, Side};
 use masseter_runtime::control::{Controller, Duties, run_cycle, set_parameters};
 use masseter_runtime::injection::Operator;
@@ -18,6 +16,7 @@ use masseter_runtime::schedule::CycleSchedule;
 use masseter_virtual_time::{Log, LoggedPorts, Sink};
 
 use super::recorded_run::{Deliveries, RecordedRun, ReplayError};
+use crate::prelude::*;
 use crate::run::request::{ControllerKind, name_of};
 
 /// What a replay came to.
@@ -88,7 +87,7 @@ impl Sink for Answers {
 
 impl Replay {
     fn new(
-        scenario: &masseter_scenario::Scenario,
+        scenario: &Scenario,
         kind: ControllerKind,
         manifest: &Manifest,
         run: RecordedRun,

@@ -1,11 +1,10 @@
 //! The signals and parameters that a controller declares. A program states them when it is ready: it is started for a
 //! scenario, without plant and recorder, and left before the first cycle.
 
-use anyhow::{Context, bail};
-use masseter_plan::RunPlan;
 use masseter_runtime::{lifecycle::attach::Invitation, named::Declared};
 
 use super::{controller::Controller, request::ControllerChoice, supervisor::reserve_domain};
+use crate::prelude::*;
 
 /// The declaration of this controller for a planned scenario.
 ///
@@ -26,7 +25,7 @@ pub(crate) fn declared_by(choice: &ControllerChoice, plan: &RunPlan) -> anyhow::
         *file = std::path::absolute(&file)?;
     }
     let path = domain.root().join("scenario.toml");
-    std::fs::write(&path, scenario.to_toml()).with_context(|| format!("cannot write {}", path.display()))?;
+    fs::write(&path, scenario.to_toml()).with_context(|| format!("cannot write {}", path.display()))?;
     let start = Controller::start_process(choice, &domain, Invitation::new(path, None), Vec::new(), 0.0);
     // The end of the controller closes its line, by which the program ends.
     let ready = start.and_then(|mut controller| controller.wait_ready(|| false, || None));

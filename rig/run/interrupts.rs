@@ -4,7 +4,6 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::{io, sync::Arc};
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-use signal_hook::{flag, iterator::Signals, low_level::emulate_default_handler};
 
 use crate::prelude::*;
 
@@ -23,16 +22,16 @@ impl Interrupts {
         let interrupts = Self::default();
         let hang_up = (!is_ignored(SIGHUP)).then_some(SIGHUP);
         let caught: Vec<_> = [SIGINT, SIGTERM].into_iter().chain(hang_up).collect();
-        let mut signals = Signals::new(&caught)?;
+        let mut signals = signal_hook::iterator::Signals::new(&caught)?;
         for signal in caught {
-            flag::register(signal, Arc::clone(&interrupts.is_requested))?;
+            signal_hook::flag::register(signal, Arc::clone(&interrupts.is_requested))?;
         }
         std::thread::spawn({
             let Self { count, is_over, .. } = interrupts.clone();
             move || {
                 for signal in signals.forever() {
                     if is_over.load(Ordering::Relaxed) {
-                        let _ = emulate_default_handler(signal);
+                        let _ = signal_hook::low_level::emulate_default_handler(signal);
                     }
                     count.fetch_add(1, Ordering::Relaxed);
                 }

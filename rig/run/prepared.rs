@@ -1,13 +1,7 @@
 //! A run with its folder: prepared, played into the folder, and reported from there.
 
-use std::fs::File;
-
-use masseter_controller::process::BuildController;
-use masseter_judge::{Analysis, Figures, Verdict};
-use masseter_plan::RunPlan;
-use masseter_recording::{Ending, FullSpeed, Manifest, RunFolder};
+use masseter_recording::{Ending, FullSpeed};
 use masseter_report::Detail;
-use masseter_scenario::FileConfig;
 use masseter_scenario::input::{MOST_KEPT_BYTES, foreign_text, read_bytes, read_text};
 
 use super::request::{ClockKind, ControllerChoice, RunRequest, name_of};
@@ -36,7 +30,7 @@ pub(crate) struct PlayedRun {
     folder: RunFolder,
     manifest: Manifest,
     /// The summary's room on the disk.
-    reserved: File,
+    reserved: std::fs::File,
     /// For those who watched.
     report_server: Option<masseter_recorder::live::ReportServer>,
     /// Whether the manifest was written.
@@ -126,7 +120,7 @@ impl PlayedRun {
     }
 
     /// The same without printing; none for a run that was interrupted before anything was recorded.
-    pub(crate) fn judge_unseen(self) -> Result<Option<Verdict>, Failure> {
+    pub(crate) fn judge_unseen(self) -> Result<Option<masseter_judge::Verdict>, Failure> {
         if self.is_unstarted() {
             return Ok(None);
         }
@@ -147,11 +141,11 @@ impl PlayedRun {
 pub(super) fn analyse_unrecorded(
     plan: &RunPlan,
     controller: &ControllerChoice,
-    build: BuildController,
+    build: masseter_controller::process::BuildController,
     interrupts: &Interrupts,
-) -> Result<(Manifest, Figures), Failure> {
+) -> Result<(Manifest, masseter_judge::Figures), Failure> {
     let mut manifest = manifest_of(plan, controller, ClockKind::Virtual);
-    let start = Analysis::without_report;
+    let start = masseter_judge::Analysis::without_report;
     let figures = masseter_virtual_time::analyse(plan, build, start, &mut manifest, interrupts).died()?;
     Ok((manifest, figures))
 }
@@ -181,7 +175,7 @@ fn write_manifest(folder: &RunFolder, manifest: &Manifest) -> Result<(), Failure
 fn keep_scenario(folder: &RunFolder, scenario: &Scenario) -> anyhow::Result<()> {
     let mut kept = scenario.clone();
     for (name, file) in kept.files_mut() {
-        let bytes = read_bytes(file, FileConfig::MOST_BYTES);
+        let bytes = read_bytes(file, masseter_scenario::FileConfig::MOST_BYTES);
         let bytes = bytes.with_context(|| format!("cannot read {}", file.display()))?;
         // A C3D file is no text.
         match foreign_text(&bytes) {

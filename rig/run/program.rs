@@ -8,7 +8,6 @@ use std::os::fd::{AsFd, OwnedFd};
 use std::process::{self, Child, Command, ExitStatus, Stdio};
 use std::{ffi::OsString, fs::File, io, os::unix::process::CommandExt};
 
-use masseter_runtime::clock::SECOND_NS;
 use masseter_runtime::lifecycle::attach::{Invitation, RIG_VARIABLE};
 use masseter_runtime::lifecycle::{End, Order, ReportError};
 use masseter_runtime::{conversation::Left, transport::Domain};
@@ -23,7 +22,7 @@ use crate::prelude::*;
 /// The hidden verb that ties a process to the supervisor before it becomes the program.
 const EXEC_VERB: &str = "exec-program";
 /// Longest wait for an executable to end by itself after its work.
-const EXIT_TIMEOUT_NS: u64 = 5 * SECOND_NS;
+const EXIT_TIMEOUT_NS: u64 = 5 * masseter_runtime::clock::SECOND_NS;
 
 /// A program that is, or will be, the controller.
 pub(super) struct Program {

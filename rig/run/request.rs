@@ -1,18 +1,17 @@
 //! What a run is asked for, as the arguments of `masseter run` have it. The other verbs set some of it.
 
-use std::path::{Path, PathBuf};
 use std::{net::SocketAddr, os::unix::fs::PermissionsExt, str::FromStr, time::Duration};
 
-use clap::{Args, ValueEnum};
+use clap::ValueEnum;
 use masseter_controller::hold_position::HoldPosition;
 use masseter_controller::motion_controller::MotionController;
 use masseter_controller::process::BuildController;
-use masseter_plan::Overrides;
 use masseter_recorder::live;
 use masseter_runtime::lifecycle::Patience;
 use rustix::fs::Mode;
 
 use crate::cli::arguments::{Wires, parse_address, parse_cores, parse_duration, parse_patience, parse_wires};
+use crate::prelude::*;
 
 /// The patience of a run in lockstep.
 const DEFAULT_PATIENCE: Duration = Duration::from_secs(10);
@@ -97,7 +96,7 @@ pub(crate) struct RunRequest {
     pub(super) name: Option<String>,
     /// Format of standard output
     #[arg(long, value_enum, default_value_t, help_heading = WATCH)]
-    pub(super) format: masseter_terminal::Format,
+    pub(super) format: Format,
     /// Exit with 3 unless the kernel grants cores, SCHED_FIFO, locked memory and, if requested, /dev/cpu_dma_latency
     #[arg(long, help_heading = HOW)]
     pub(super) require_rt: bool,
@@ -286,7 +285,7 @@ impl ControllerChoice {
                 arguments.push(map.clone());
                 Ok(Self::Executable(program, arguments))
             }
-            _ => anyhow::bail!("--map is for --controller fmu:FILE.fmu"),
+            _ => bail!("--map is for --controller fmu:FILE.fmu"),
         }
     }
 }

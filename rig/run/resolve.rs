@@ -1,19 +1,16 @@
 //! The plan and the clock of a run; refuses what this machine, the clock or the controller does not have.
 
-use std::{path::Path, thread};
-
-use anyhow::{bail, ensure};
 use masseter_controller::process::BuildController;
 use masseter_judge::requirements::{RequirementError, check_requirements};
-use masseter_plan::RunPlan;
 use masseter_plant::core as plant;
 use masseter_recorder::live;
 use masseter_runtime::injection::{Operator, OperatorError, is_seen_by_controller};
 use masseter_runtime::named::{NameError, NamedValues};
 use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain, usable_cores};
-use masseter_scenario::{CommandFault, FaultKindConfig, ProcessFault, Scenario, StimulusConfig};
+use masseter_scenario::{CommandFault, FaultKindConfig, ProcessFault, StimulusConfig};
 
 use super::request::{ClockKind, ControllerChoice, RunRequest};
+use crate::prelude::*;
 
 /// The highest SCHED_FIFO priority.
 const HIGHEST_PRIORITY: u8 = 99;
@@ -121,7 +118,7 @@ fn choose_clock(request: &RunRequest, scenario: &Scenario) -> ClockKind {
         matches!(request.controller, ControllerChoice::External | ControllerChoice::Executable(..));
     let say = |what: &str| {
         if !request.quiet {
-            masseter_terminal::status!("clock: lockstep, {what}");
+            status!("clock: lockstep, {what}");
         }
         ClockKind::Lockstep
     };
@@ -154,7 +151,7 @@ fn refusal(scenario: &Scenario) -> Option<String> {
     let try_on = |core| {
         let request = SchedulingRequest { core: Some(core), fifo_priority, locked_memory: false };
         // The thread ends with its priority.
-        let tried = thread::spawn(move || obtain(request));
+        let tried = std::thread::spawn(move || obtain(request));
         let obtained = tried.join().expect("asking the kernel does not panic");
         if obtained.core == Some(core) && obtained.fifo_priority != fifo_priority {
             return Some(format!("SCHED_FIFO is refused; to allow it: {}", crate::doctor::grant_command()));

@@ -8,7 +8,6 @@ use std::sync::mpsc::{Receiver, channel};
 use std::{os::fd::OwnedFd, thread, time::Duration};
 
 use masseter_recording::{ProcessFault, RunFolder};
-use masseter_runtime::lifecycle::Order;
 use masseter_runtime::realtime::scheduling::{SchedulingRequest, obtain};
 use masseter_scenario::{
     CommandFault, FaultConfig, FaultKindConfig, ProcessFault as Kind, RealtimeConfig, Scenario,
@@ -57,7 +56,7 @@ impl Strikes {
                     self.carry_out_one(fault, now_ns, victims);
                 }
                 // It may have ended.
-                let _ = victims.controller.order(&Order::Struck);
+                let _ = victims.controller.order(&masseter_runtime::lifecycle::Order::Struck);
             } else {
                 self.carry_out_one(fault, clock::now_ns(), victims);
             }

@@ -13,15 +13,13 @@ use std::process::ExitStatus;
 use std::time::Duration;
 
 use masseter_machine::{SystemRoot, dma_latency};
-use masseter_plan::RunPlan;
 use masseter_recorder::live::ReportServer;
-use masseter_recording::{DmaLatency, Ending, Manifest, RunFolder, RunUsage};
+use masseter_recording::{DmaLatency, Ending, RunUsage};
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_runtime::lifecycle::attach::Invitation;
 use masseter_runtime::lifecycle::{End, Order, Party, Patience, Silence, Start};
 use masseter_runtime::lockstep;
 use masseter_runtime::named::Declared;
-use masseter_runtime::realtime::scheduling::Obtained;
 use masseter_runtime::schedule::OFF_TICK_NS;
 use masseter_runtime::transport::{Domain, DomainError, DomainLock, Swept};
 use masseter_virtual_time::Requests;
@@ -125,7 +123,7 @@ fn report_remaining(swept: &Swept) {
 }
 
 /// What the kernel granted each process.
-type Scheduling = BTreeMap<String, Obtained>;
+type Scheduling = BTreeMap<String, masseter_runtime::realtime::scheduling::Obtained>;
 
 /// The three processes, in the order of their start.
 struct Processes {

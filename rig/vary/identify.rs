@@ -9,15 +9,15 @@ mod fit;
 mod tests;
 
 use masseter_model::geometry::AXES;
-use masseter_plan::{Overrides, scenario_with_overrides};
-use masseter_recording::{FolderError, Manifest, ReadError, Reader, Recorded, RunFolder, Topic};
+use masseter_recording::{FolderError, ReadError, Reader, Recorded, Topic};
 use masseter_runtime::messages::codes::DriveState;
 use masseter_runtime::messages::{Command, Reading};
-use masseter_scenario::{Scenario, wording::counted};
 use masseter_virtual_time::{Requests, Rig, RigError};
 use serde::Serialize;
 
 use fit::{BLOCKS, Estimate, Fit, Model, Noise, Row, Unknown};
+
+use crate::prelude::*;
 
 /// Fewest cycles of moving drives.
 const FEWEST_CYCLES: usize = 50 * BLOCKS;

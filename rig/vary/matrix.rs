@@ -4,12 +4,11 @@
 use masseter_campaign::{Coverage, FaultRow};
 use masseter_judge::EventRecord;
 use masseter_model::geometry::{AXIS_NAMES, Vec3};
-use masseter_plan::RunPlan;
 use masseter_runtime::messages::codes::{Cause, EventKind};
-use masseter_scenario::{ChecksConfig, DriveFault, FaultConfig, FaultKindConfig, Quantity, Scenario};
-use masseter_terminal::Failure;
+use masseter_scenario::{ChecksConfig, DriveFault, FaultConfig, FaultKindConfig, Quantity};
 use rayon::prelude::*;
 
+use crate::prelude::*;
 use crate::run::runner::{Judged, Runner, Source};
 
 /// How long a fault acts that does not last, s.

@@ -10,7 +10,6 @@ use masseter_campaign::{
     Campaign, CampaignFile, CampaignFolder, Case, CaseResult, FolderError, Report, StopRules, WorstCase,
     digest_of_program,
 };
-use masseter_plan::{Overrides, scenario_with_overrides};
 use masseter_table::{Format, ParquetProgram};
 use masseter_terminal::in_one_line;
 

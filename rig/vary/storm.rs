@@ -105,8 +105,7 @@ impl<'a> Season<'a> {
     ) -> anyhow::Result<Self> {
         fs::create_dir_all(out).with_context(|| out.display().to_string())?;
         let lock = File::create(out.join(LOCK)).with_context(|| out.display().to_string())?;
-        rustix::fs::flock(&lock, rustix::fs::FlockOperation::NonBlockingLockExclusive)
-            .map_err(|_| anyhow!("another masseter plays storms in {}", out.display()))?;
+        lock.try_lock().map_err(|_| anyhow!("another masseter plays storms in {}", out.display()))?;
         let new = StormLog {
             seed,
             program: super::play::this_program()?,

@@ -10,15 +10,12 @@ mod tests;
 
 use std::iter;
 
-use masseter_controller::process::BuildController;
 use masseter_judge::{Check, CheckResult, EventRecord, Figures, Verdict, Watch, signals::Registry};
-use masseter_plan::{Overrides, RunPlan, scenario_with_overrides};
-use masseter_recording::{Manifest, RunFolder, manifest_of};
+use masseter_recording::manifest_of;
 use masseter_report::why::{Detected, Instant, Interval, Left, Look, Why};
 use masseter_runtime::injection::{Injected, Withdrawn};
 use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind};
 use masseter_runtime::named::Declared;
-use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use masseter_virtual_time::{Branches, Mark, Requests, Run, Without};
 
 use crate::prelude::*;
@@ -79,7 +76,7 @@ fn check_entries(scenario: &Scenario, without: &Without) -> anyhow::Result<()> {
 /// The digest of the run as it was judged.
 fn digest_of(folder: &RunFolder) -> anyhow::Result<String> {
     let path = folder.summary();
-    let summary = read_text(&path, MOST_KEPT_BYTES);
+    let summary = masseter_scenario::input::read_text(&path, masseter_scenario::input::MOST_KEPT_BYTES);
     let summary = summary
         .with_context(|| format!("{} is needed: 'masseter report' writes it again", path.display()))?;
     let summary: serde_json::Value =
@@ -92,7 +89,7 @@ fn digest_of(folder: &RunFolder) -> anyhow::Result<String> {
 
 struct Question<'a> {
     plan: RunPlan,
-    build: BuildController,
+    build: masseter_controller::process::BuildController,
     manifest: Manifest,
     without: Without,
     interrupts: &'a Interrupts,

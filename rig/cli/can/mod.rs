@@ -2,7 +2,6 @@
 
 mod serve;
 
-use clap::Subcommand;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use masseter_can::{BusPlan, PlannedMessage};
 use masseter_model::geometry::AXIS_NAMES;
@@ -15,7 +14,7 @@ use serde_json::{Value, json};
 use crate::prelude::*;
 
 /// Verbs of `can`.
-#[derive(Debug, Clone, Subcommand)]
+#[derive(Debug, Clone, clap::Subcommand)]
 pub(crate) enum CanVerb {
     /// Print the load and the worst-case response times of every bus
     Plan(PlanArgs),

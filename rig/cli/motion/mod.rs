@@ -7,7 +7,6 @@ mod description;
 mod found;
 mod picture;
 
-use masseter_plan::{Overrides, scenario_with_overrides};
 use masseter_terminal::{Tone, result_with_tones};
 
 use crate::prelude::*;

@@ -2,7 +2,6 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use masseter_plan::Overrides;
 use masseter_scenario::MatrixCase;
 
 use super::choice::{Choice, Shard};

@@ -5,7 +5,6 @@
 use masseter_controller::process::BuildController;
 use masseter_judge::{Analysis, Figures};
 use masseter_runtime::named::{Declared, NameError};
-use masseter_runtime::{control::NoBranch, messages::tap::TapError};
 
 use crate::log::Stream;
 use crate::run::{Requests, RestoreError, Run, RunSnapshot, Without, built};
@@ -18,7 +17,7 @@ pub enum BranchError {
     Name(#[from] NameError),
     /// A message of the topic 'frame' is no CAN frame.
     #[error(transparent)]
-    Tap(#[from] TapError),
+    Tap(#[from] masseter_runtime::messages::tap::TapError),
 }
 
 /// A run by a controller of the rig, at an instant between two cycles.
@@ -61,7 +60,7 @@ impl Branches {
     ///
     /// # Errors
     /// Where the controller cannot be copied.
-    pub fn mark(&self) -> Result<Mark, NoBranch> {
+    pub fn mark(&self) -> Result<Mark, masseter_runtime::control::NoBranch> {
         Ok(Mark { cycle: self.0.cycle(), snapshot: self.0.snapshot()? })
     }
 

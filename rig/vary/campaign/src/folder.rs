@@ -3,13 +3,12 @@
 //! An attempt has a folder of its own, which is renamed to that of the case when the case has ended. So a case has a
 //! result or none, whenever a process dies. An attempt whose process is gone is swept.
 
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use masseter_scenario::Scenario;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
-use rustix::fs::{FlockOperation, flock};
 
 use crate::campaign::Campaign;
 use crate::case::{Case, CaseResult};
@@ -116,7 +115,7 @@ impl CampaignFolder {
     /// When its folder cannot be made.
     pub fn attempt(&self, case: &Case) -> Result<Attempt, FolderError> {
         let attempts = self.path.join(ATTEMPTS);
-        let _no_sweep = self.hold_plan(FlockOperation::LockShared)?;
+        let _no_sweep = self.hold_plan(File::lock_shared)?;
         let prefix = format!("{}.", case.id);
         let folder =
             tempfile::Builder::new().prefix(&prefix).tempdir_in(&attempts).map_err(system(&attempts))?;
@@ -127,12 +126,11 @@ impl CampaignFolder {
     /// Removes the attempts of processes that are gone.
     fn sweep(&self) -> Result<(), FolderError> {
         let attempts = self.path.join(ATTEMPTS);
-        let _no_beginning = self.hold_plan(FlockOperation::LockExclusive)?;
+        let _no_beginning = self.hold_plan(File::lock)?;
         for entry in fs::read_dir(&attempts).map_err(system(&attempts))? {
             let path = entry.map_err(system(&attempts))?.path();
             // No attempt begins now, so a folder without a lock belongs to a process that died before it had one.
-            let is_alive = File::open(path.join(LOCK))
-                .is_ok_and(|file| flock(&file, FlockOperation::NonBlockingLockExclusive).is_err());
+            let is_alive = File::open(path.join(LOCK)).is_ok_and(|file| file.try_lock().is_err());
             if !is_alive {
                 let _ = fs::remove_dir_all(&path);
             }
@@ -142,10 +140,10 @@ impl CampaignFolder {
 
     /// Keeps the sweep and the beginning of attempts apart while the file lives: attempts share it, the sweep has it
     /// alone.
-    fn hold_plan(&self, how: FlockOperation) -> Result<File, FolderError> {
+    fn hold_plan(&self, lock: fn(&File) -> io::Result<()>) -> Result<File, FolderError> {
         let path = self.plan_path();
         let plan = File::options().append(true).open(&path).map_err(system(&path))?;
-        flock(&plan, how).map_err(|error| system(&path)(error.into()))?;
+        lock(&plan).map_err(system(&path))?;
         Ok(plan)
     }
 
@@ -214,10 +212,10 @@ fn has_more_than_a_lock(entries: fs::ReadDir) -> bool {
 fn lock(folder: &Path) -> Result<File, FolderError> {
     let path = folder.join(LOCK);
     let file = File::options().create(true).append(true).open(&path).map_err(system(&path))?;
-    match flock(&file, FlockOperation::NonBlockingLockExclusive) {
+    match file.try_lock() {
         Ok(()) => Ok(file),
-        Err(rustix::io::Errno::WOULDBLOCK) => Err(FolderError::InUse(folder.to_owned())),
-        Err(error) => Err(system(&path)(error.into())),
+        Err(TryLockError::WouldBlock) => Err(FolderError::InUse(folder.to_owned())),
+        Err(TryLockError::Error(error)) => Err(system(&path)(error)),
     }
 }
 
