@@ -6,7 +6,7 @@ pub(crate) use std::path::{Path, PathBuf};
 
 pub(crate) use anyhow::{Context, anyhow, bail, ensure};
 pub(crate) use clap::Args;
-pub(crate) use masseter_plan::{Overrides, RunPlan, scenario_with_overrides};
+pub(crate) use masseter_plan::{RunPlan, scenario_with};
 pub(crate) use masseter_recording::{Manifest, RunFolder};
 pub(crate) use masseter_runtime::clock;
 pub(crate) use masseter_scenario::{Scenario, wording::counted};

@@ -157,7 +157,7 @@ pub(super) struct ShrinkArgs {
 /// Shrinks a scenario, and prints the smallest one.
 pub(super) fn shrink(args: &ShrinkArgs) -> Result<Exit, Failure> {
     let path = scenario_of(&args.path).usage()?;
-    let scenario = scenario_with_overrides(Some(&path), &Overrides::default()).usage()?;
+    let scenario = scenario_with(Some(&path), &[]).usage()?;
     let runner = Runner::of_verb(ControllerChoice::Own(args.controller))?;
     let reason = Reason::of(&runner, &scenario, args.requirement.as_deref())?;
     status!("fails by {reason}; shrinking");

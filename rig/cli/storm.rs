@@ -33,7 +33,7 @@ pub(super) struct StormArgs {
 
 /// Plays storms; [`Exit::Failed`] where one breaks a law.
 pub(super) fn storm(args: &StormArgs) -> Result<Exit, Failure> {
-    let base = scenario_with_overrides(args.scenario.as_deref(), &Overrides::default()).usage()?;
+    let base = scenario_with(args.scenario.as_deref(), &[]).usage()?;
     // A mistake in the scenario itself is in every storm.
     crate::run::resolve_simulated(&base, args.scenario.as_deref(), args.controller.builder()).usage()?;
     let runner = crate::run::runner::Runner::of_verb(ControllerChoice::Own(args.controller))?;

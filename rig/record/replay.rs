@@ -45,8 +45,7 @@ pub(crate) fn replay(run: &Path, kind: Option<ControllerKind>, set: &[String]) -
     let recorded_kind =
         recorded_kind.ok_or_else(|| ReplayError::ForeignController(manifest.controller.clone()))?;
     let kind = kind.unwrap_or(recorded_kind);
-    let overrides = Overrides { set: set.to_vec(), ..Overrides::default() };
-    let scenario = scenario_with_overrides(Some(&folder.scenario()), &overrides)?;
+    let scenario = scenario_with(Some(&folder.scenario()), set)?;
     let name = || folder.recording().display().to_string();
     let run = RecordedRun::read(&mut Reader::open(&folder.recording()).with_context(name)?, &manifest)
         .with_context(name)?;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plan::{Overrides, scenario_with_overrides};
+use masseter_plan::{read_scenario_with, set_keys};
 use masseter_scenario::Scenario;
 
 use crate::cli::arguments::{Wires, parse_wires};
@@ -28,8 +28,13 @@ impl RobotArgs {
     /// # Errors
     /// When the file cannot be read or a value is out of range.
     pub(crate) fn scenario(&self) -> anyhow::Result<Scenario> {
-        let interfaces = self.can.as_ref().map(|wires| wires.0.clone());
-        scenario_with_overrides(self.scenario.as_deref(), &Overrides { interfaces, ..Overrides::default() })
+        read_scenario_with(self.scenario.as_deref(), |scenario| {
+            set_keys(scenario, None, &[])?;
+            if let Some(Wires(interfaces)) = &self.can {
+                scenario.can.interfaces.clone_from(interfaces);
+            }
+            Ok(())
+        })
     }
 }
 

@@ -6,6 +6,7 @@ use clap::ValueEnum;
 use masseter_controller::hold_position::HoldPosition;
 use masseter_controller::motion_controller::MotionController;
 use masseter_controller::process::BuildController;
+use masseter_plan::{enter_dry_run, set_keys};
 use masseter_recorder::live;
 use masseter_runtime::lifecycle::Patience;
 use rustix::fs::Mode;
@@ -124,20 +125,27 @@ pub(crate) struct RunRequest {
 }
 
 impl RunRequest {
-    /// The changes to the scenario.
-    pub(super) fn overrides(&self) -> Overrides {
-        Overrides {
-            set: self.set.clone(),
-            trajectory: self.trajectory.clone(),
-            duration: self.duration,
-            rate_hz: self.rate_hz,
-            interfaces: self.can.as_ref().map(|wires| wires.0.clone()),
-            cores: self.cores,
-            seed: self.seed,
-            is_dry: self.dry,
-            reset_faults: self.reset_faults,
-            wait_ready: self.wait_ready,
+    /// Changes the scenario. Values of keys come first.
+    pub(super) fn change(&self, scenario: &mut Scenario) -> anyhow::Result<()> {
+        set_keys(scenario, self.trajectory.as_deref(), &self.set)?;
+        if let Some(duration) = self.duration {
+            scenario.duration_s = Some(duration.as_secs_f64());
         }
+        if let Some(Wires(interfaces)) = &self.can {
+            scenario.can.interfaces.clone_from(interfaces);
+        }
+        if self.dry {
+            enter_dry_run(scenario);
+        }
+        scenario.can.reset_faults |= self.reset_faults;
+        if let Some(wait) = self.wait_ready {
+            scenario.can.ready_timeout_ms =
+                u32::try_from(wait.as_millis()).context("--wait-ready: use at most 49 days")?;
+        }
+        scenario.rate_hz = self.rate_hz.unwrap_or(scenario.rate_hz);
+        scenario.seed = self.seed.unwrap_or(scenario.seed);
+        scenario.realtime.cores = self.cores.unwrap_or(scenario.realtime.cores);
+        Ok(())
     }
 
     /// For how long a process may be silent, if the run is in lockstep.

@@ -17,8 +17,8 @@ const HIGHEST_PRIORITY: u8 = 99;
 
 /// Plans the run and chooses its clock; refuses interfaces and addresses that this machine does not have.
 pub(super) fn resolve(request: &RunRequest) -> anyhow::Result<(RunPlan, RunRequest)> {
-    let overrides = request.overrides();
-    let scenario = masseter_plan::scenario_with_overrides(request.scenario.as_deref(), &overrides)?;
+    let change = |scenario: &mut Scenario| request.change(scenario);
+    let scenario = masseter_plan::read_scenario_with(request.scenario.as_deref(), change)?;
     request.cores.map_or(Ok(()), |cores| check_cores(&cores, &usable_cores()))?;
     let controller = request.controller.clone().with_map(request.map.as_ref())?;
     let request = RunRequest { controller, ..request.clone() };

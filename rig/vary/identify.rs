@@ -154,9 +154,7 @@ pub(crate) fn identify(
 ) -> Result<Answer, IdentifyError> {
     let folder = RunFolder::open(run)?;
     let manifest = Manifest::read(&folder).map_err(|error| IdentifyError::Run(error.into()))?;
-    let overrides = Overrides { set: set.to_vec(), ..Overrides::default() };
-    let scenario =
-        scenario_with_overrides(Some(&folder.scenario()), &overrides).map_err(IdentifyError::Run)?;
+    let scenario = scenario_with(Some(&folder.scenario()), set).map_err(IdentifyError::Run)?;
     let played = Played::read(&folder, manifest.is_in_real_time())?;
     played.identify(scenario, requests)
 }

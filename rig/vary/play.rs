@@ -25,7 +25,7 @@ const WORST: &str = "worst";
 /// The campaign of a file.
 pub(crate) fn plan(file: &Path, controller: ControllerKind) -> anyhow::Result<Campaign> {
     let read = CampaignFile::read(file)?;
-    let base = scenario_with_overrides(read.scenario.as_deref(), &Overrides::default())?;
+    let base = scenario_with(read.scenario.as_deref(), &[])?;
     let parent = file.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let campaign = Campaign {
         file: read,

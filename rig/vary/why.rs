@@ -40,7 +40,7 @@ pub(crate) fn why(run: &Path, without: Without, interrupts: &Interrupts) -> anyh
         let name = manifest.controller.as_deref().unwrap_or_default();
         format!("the controller '{name}' is none of the rig's, and its state cannot be copied: only 'motion' and 'hold' can go on from an instant")
     })?;
-    let scenario = scenario_with_overrides(Some(&folder.scenario()), &Overrides::default())?;
+    let scenario = scenario_with(Some(&folder.scenario()), &[])?;
     check_entries(&scenario, &without)?;
     let plan = resolve_simulated(&scenario, Some(&folder.scenario()), kind.builder())?;
     let digest = digest_of(&folder)?;

@@ -7,6 +7,7 @@ mod description;
 mod found;
 mod picture;
 
+use masseter_plan::{read_scenario_with, set_keys};
 use masseter_terminal::{Tone, result_with_tones};
 
 use crate::prelude::*;
@@ -43,9 +44,8 @@ pub(crate) struct MotionArgs {
 
 /// Describes the file. [`Exit::Failed`] where the rig would refuse to play it.
 pub(crate) fn motion(args: &MotionArgs) -> anyhow::Result<Exit> {
-    let overrides =
-        Overrides { set: args.set.clone(), trajectory: Some(args.file.clone()), ..Overrides::default() };
-    let scenario = scenario_with_overrides(args.scenario.as_deref(), &overrides)?;
+    let play = |scenario: &mut Scenario| set_keys(scenario, Some(&args.file), &args.set);
+    let scenario = read_scenario_with(args.scenario.as_deref(), play)?;
     let found = self::found::Found::new(&scenario, &args.file)?;
     if let (Some(path), masseter_scenario::MotionConfig::File(file)) = (&args.write, &scenario.motion) {
         write_beside(&args.file, path, &masseter_controller::trajectory::plain_form(file, &scenario.jaw)?)?;

@@ -9,7 +9,7 @@ use std::{fs, path::PathBuf, process::ExitCode, sync::Arc};
 
 use anyhow::Context;
 use clap::{Args, Parser, Subcommand};
-use masseter_plan::Overrides;
+use masseter_plan::{read_scenario_with, set_keys};
 use masseter_recording::new_folder;
 use masseter_research::{Settings, Study};
 use masseter_scenario::Scenario;
@@ -100,8 +100,8 @@ impl StudyArgs {
         if self.scenario.is_none() && self.trajectory.is_none() {
             return Ok(None);
         }
-        let overrides = Overrides { trajectory: self.trajectory.clone(), ..Overrides::default() };
-        Ok(Some(masseter_plan::scenario_with_overrides(self.scenario.as_deref(), &overrides)?))
+        let play = |scenario: &mut Scenario| set_keys(scenario, self.trajectory.as_deref(), &[]);
+        read_scenario_with(self.scenario.as_deref(), play).map(Some)
     }
 
     /// The version, the settings, and the command line that repeats the study.

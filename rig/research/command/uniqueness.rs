@@ -9,7 +9,7 @@ use std::{fs::File, io::Write};
 use anyhow::Context;
 use clap::{Args, Subcommand, ValueEnum};
 use masseter_model::geometry::{Mechanism, MechanismConfig};
-use masseter_plan::{Overrides, RunPlan};
+use masseter_plan::{RunPlan, read_scenario_with, set_keys};
 use masseter_recording::new_file;
 use masseter_research::uniqueness::{Ambiguous, InputBox, boxes, prove, search};
 use masseter_scenario::wording::counted;
@@ -140,9 +140,9 @@ fn inputs_to_prove(args: &ProveArgs) -> anyhow::Result<(Mechanism, Vec<InputBox>
         let inputs = args.region.inputs(&mechanism);
         return Ok((mechanism, vec![inputs]));
     };
-    let overrides = Overrides { trajectory: args.trajectory.clone(), ..Overrides::default() };
     let path = args.scenario.as_deref();
-    let plan = RunPlan::of_file(masseter_plan::scenario_with_overrides(path, &overrides)?, path)?;
+    let played = read_scenario_with(path, |scenario| set_keys(scenario, args.trajectory.as_deref(), &[]))?;
+    let plan = RunPlan::of_file(played, path)?;
     let inputs = boxes(&plan, around_mm * 1e-3)?;
     result_line!("{}: {} around its inputs", plan.scenario.name, counted(inputs.len() as u64, "box"))?;
     Ok((plan.mechanism, inputs))

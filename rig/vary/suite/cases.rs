@@ -157,8 +157,7 @@ fn cases_of(name: &str, path: &Path) -> Vec<Case> {
         scenario.as_ref().and_then(|scenario| scenario.matrix.cases().ok()).unwrap_or_default();
     let case = |MatrixCase { name: values, assignments: set }: MatrixCase| {
         let name = if values.is_empty() { name.to_owned() } else { format!("{name}[{values}]") };
-        let overrides = Overrides { set: set.clone(), ..Overrides::default() };
-        let changed = masseter_plan::scenario_with_overrides(Some(path), &overrides);
+        let changed = scenario_with(Some(path), &set);
         let needs_processes = changed.is_ok_and(|scenario| needs_processes(&scenario));
         let tags = scenario.as_ref().map_or_else(Vec::new, |scenario: &Scenario| scenario.tags.clone());
         Case { name, path: path.to_owned(), set, tags, needs_processes }

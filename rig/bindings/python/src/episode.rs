@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{bail, ensure};
 use masseter_judge::{EventRecord, Watch, requirements::check_requirements};
-use masseter_plan::{Overrides, RunPlan, scenario_with_overrides};
+use masseter_plan::{RunPlan, read_scenario_with, set_keys};
 use masseter_runtime::{control::Controller, messages::codes::ControllerState};
 use masseter_virtual_time::{Run, RunSnapshot};
 
@@ -89,8 +89,11 @@ pub(crate) struct Branch {
 /// The plan of an episode.
 pub(crate) fn plan(settings: &Settings, set: &[String], seed: Option<u64>) -> anyhow::Result<RunPlan> {
     let set = [&settings.set, set].concat();
-    let overrides = Overrides { set, seed, ..Overrides::default() };
-    let scenario = scenario_with_overrides(settings.scenario.as_deref(), &overrides)?;
+    let scenario = read_scenario_with(settings.scenario.as_deref(), |scenario| {
+        set_keys(scenario, None, &set)?;
+        scenario.seed = seed.unwrap_or(scenario.seed);
+        Ok(())
+    })?;
     ensure!(
         scenario.can.is_virtual(),
         "the scenario has the interfaces {}; an environment has simulated buses: leave can.interfaces out",

@@ -4,10 +4,9 @@
 //! checked by their users.
 //!
 //! ```
-//! use masseter_plan::{Overrides, RunPlan, scenario_with_overrides};
+//! use masseter_plan::{RunPlan, scenario_with};
 //!
-//! let overrides = Overrides { rate_hz: Some(500), ..Overrides::default() };
-//! let plan = RunPlan::new(scenario_with_overrides(None, &overrides)?)?;
+//! let plan = RunPlan::new(scenario_with(None, &["rate_hz=500".to_owned()])?)?;
 //! assert_eq!(plan.scenario.period_ns(), 2_000_000);
 //! # Ok::<(), anyhow::Error>(())
 //! ```
@@ -16,7 +15,6 @@ mod placement;
 mod stiffness;
 
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 use anyhow::{Context, ensure};
 use masseter_controller::trajectory::{self, Trajectory, TrajectoryError, TrajectoryReport};
@@ -40,31 +38,6 @@ pub struct RunPlan {
     pub demands: TrajectoryReport,
     /// The cycle's time table on the bus.
     pub schedule: CycleSchedule,
-}
-
-/// Changes of a command's arguments to a scenario.
-#[derive(Debug, Clone, Default)]
-pub struct Overrides {
-    /// Values of keys of the scenario, each as `KEY=VALUE`. The other changes come after them.
-    pub set: Vec<String>,
-    /// File of a recorded motion that replaces the scenario's.
-    pub trajectory: Option<PathBuf>,
-    /// Duration of the motion.
-    pub duration: Option<Duration>,
-    /// Cycles per second.
-    pub rate_hz: Option<u32>,
-    /// The real interface of each bus; none for simulated buses.
-    pub interfaces: Option<Vec<String>>,
-    /// Cores of controller and plant.
-    pub cores: Option<[usize; 2]>,
-    /// Seed of every random number.
-    pub seed: Option<u64>,
-    /// Whether a fault that a drive has at the start is reset.
-    pub reset_faults: bool,
-    /// Whether the run is a dry one.
-    pub is_dry: bool,
-    /// How long the drives wait for one that is not ready.
-    pub wait_ready: Option<Duration>,
 }
 
 impl RunPlan {
@@ -177,12 +150,12 @@ pub fn read_scenario_with(
     Ok(scenario)
 }
 
-/// The scenario of a file, or the default one, with every override applied and each value checked by itself.
+/// The scenario of a file, or the default one, with values of keys, each as `KEY=VALUE`.
 ///
 /// # Errors
 /// When the file or the motion cannot be read, or a value lies outside its range.
-pub fn scenario_with_overrides(path: Option<&Path>, overrides: &Overrides) -> anyhow::Result<Scenario> {
-    read_scenario_with(path, |scenario| apply_overrides(overrides, scenario))
+pub fn scenario_with(path: Option<&Path>, set: &[String]) -> anyhow::Result<Scenario> {
+    read_scenario_with(path, |scenario| set_keys(scenario, None, set))
 }
 
 /// The largest demands of a motion on the axes of a scenario.
@@ -198,12 +171,17 @@ pub fn demands(
     trajectory::check(trajectory, mechanism, &limits, scenario.period_s())
 }
 
-fn apply_overrides(overrides: &Overrides, scenario: &mut Scenario) -> anyhow::Result<()> {
+/// Replaces the motion of a scenario by that of a file, if one is given; then sets keys, each as `KEY=VALUE`, and makes the
+/// paths of files absolute.
+///
+/// # Errors
+/// When a key or its value is refused, or there is no such file.
+pub fn set_keys(scenario: &mut Scenario, trajectory: Option<&Path>, set: &[String]) -> anyhow::Result<()> {
     // The keys of a file can be set only for a motion that is a file.
-    if let Some(path) = &overrides.trajectory {
+    if let Some(path) = trajectory {
         play_file(path, scenario);
     }
-    for assignment in &overrides.set {
+    for assignment in set {
         *scenario = scenario.with(assignment).context("--set")?;
     }
     if let MotionConfig::File(file) = &scenario.motion
@@ -218,28 +196,11 @@ fn apply_overrides(overrides: &Overrides, scenario: &mut Scenario) -> anyhow::Re
         // The processes read it too, from other folders.
         *memory = std::path::absolute(&*memory).context("drives.memory")?;
     }
-    if let Some(duration) = overrides.duration {
-        scenario.duration_s = Some(duration.as_secs_f64());
-    }
-    if let Some(interfaces) = &overrides.interfaces {
-        scenario.can.interfaces.clone_from(interfaces);
-    }
-    if overrides.is_dry {
-        enter_dry_run(scenario);
-    }
-    scenario.can.reset_faults |= overrides.reset_faults;
-    if let Some(wait) = overrides.wait_ready {
-        scenario.can.ready_timeout_ms =
-            u32::try_from(wait.as_millis()).context("--wait-ready: use at most 49 days")?;
-    }
-    scenario.rate_hz = overrides.rate_hz.unwrap_or(scenario.rate_hz);
-    scenario.seed = overrides.seed.unwrap_or(scenario.seed);
-    scenario.realtime.cores = overrides.cores.unwrap_or(scenario.realtime.cores);
     Ok(())
 }
 
 /// Makes a scenario that of its dry run; one that is a dry run already stays as it is.
-fn enter_dry_run(scenario: &mut Scenario) {
+pub fn enter_dry_run(scenario: &mut Scenario) {
     if std::mem::replace(&mut scenario.dry.is_on, true) {
         return;
     }
