@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use masseter_machine::SystemRoot;
-use masseter_machine::counters::{ThreadCounters, loop_thread, stolen_by_core_ns};
+use masseter_machine::counters::{Counters, loop_thread, stolen_by_core_ns};
 use masseter_recording::LoopInterval;
 use masseter_runtime::clock::MILLISECOND_NS;
 
@@ -96,7 +96,7 @@ impl WatchedLoop {
             }
         }
         self.samples += 1;
-        let counters = self.thread.and_then(|thread| ThreadCounters::read(root, self.process, thread));
+        let counters = self.thread.and_then(|thread| Counters::of_thread(root, self.process, thread));
         let now = counters.map(|counters| Sample { time_ns, counters, stolen_ns: stolen_ns.clone() });
         if let (Some(last), Some(now)) = (&self.last, &now) {
             self.kept.add(last.until(now), period_ns);
@@ -108,7 +108,7 @@ impl WatchedLoop {
 /// The counters of a loop's thread, and the steal time of each core.
 struct Sample {
     time_ns: u64,
-    counters: ThreadCounters,
+    counters: Counters,
     stolen_ns: BTreeMap<usize, u64>,
 }
 

@@ -4,7 +4,7 @@
 //! Counted from the first sample on, when the processes are in their steady state.
 
 use masseter_machine::counters::{Sample, Sampler};
-use masseter_machine::{SystemRoot, counters::ProcessCounters};
+use masseter_machine::{SystemRoot, counters::Counters};
 use masseter_recording::{RunUsage, Usage};
 use masseter_runtime::clock::{self, SECOND_NS};
 
@@ -27,7 +27,7 @@ pub(super) struct UsageMeter {
 #[derive(Debug)]
 struct ProcessUsage {
     name: &'static str,
-    span: Option<[(u64, ProcessCounters); 2]>,
+    span: Option<[(u64, Counters); 2]>,
 }
 
 /// Follows the wall clock.
@@ -48,7 +48,7 @@ impl WallClock {
 }
 
 impl ProcessUsage {
-    fn add(&mut self, time_ns: u64, counters: ProcessCounters) {
+    fn add(&mut self, time_ns: u64, counters: Counters) {
         let now = (time_ns, counters);
         let [first, last] = self.span.unwrap_or([now; 2]);
         // The threads of a process that is about to end no longer count: CPU time falls, and the last sample stays.
@@ -58,9 +58,10 @@ impl ProcessUsage {
     /// None from a single sample.
     fn usage(&self) -> Option<Usage> {
         let [(first_ns, first), (last_ns, last)] = self.span?;
+        let cpu_ns = last.cpu_ns? - first.cpu_ns?;
         (first_ns < last_ns).then(|| Usage {
             observed_s: (last_ns - first_ns) as f64 / 1e9,
-            cpu_s: (last.cpu_ns - first.cpu_ns) as f64 / 1e9,
+            cpu_s: cpu_ns as f64 / 1e9,
             voluntary_switches: last.voluntary_switches - first.voluntary_switches,
             involuntary_switches: last.involuntary_switches - first.involuntary_switches,
             minor_faults: last.minor_faults - first.minor_faults,
@@ -121,20 +122,17 @@ mod tests {
 
     use super::*;
 
-    fn counters(switches: u64, faults: u64, cpu_ns: u64) -> ProcessCounters {
-        ProcessCounters {
-            cpu_ns,
+    fn counters(switches: u64, faults: u64, cpu_ns: u64) -> Counters {
+        Counters {
+            cpu_ns: Some(cpu_ns),
             voluntary_switches: switches,
             involuntary_switches: 2,
             minor_faults: faults,
-            major_faults: 0,
+            ..Counters::default()
         }
     }
 
-    fn usage_of(
-        processes: &[(&'static str, u32)],
-        samples: &[(u64, &[Option<ProcessCounters>])],
-    ) -> RunUsage {
+    fn usage_of(processes: &[(&'static str, u32)], samples: &[(u64, &[Option<Counters>])]) -> RunUsage {
         let mut meter = UsageMeter::new(0, processes);
         for (time_ns, counters) in samples {
             let processes = counters.to_vec();

@@ -10,36 +10,6 @@ use crate::SystemRoot;
 /// `/proc/stat` counts in hundredths of a second (USER_HZ) on every platform of the rig.
 const TICK_NS: u64 = 10_000_000;
 
-/// The kernel's counters of a process.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ProcessCounters {
-    /// CPU time of all threads that run.
-    pub cpu_ns: u64,
-    /// Context switches that the main thread asked for by waiting.
-    pub voluntary_switches: u64,
-    /// Those that the main thread did not ask for.
-    pub involuntary_switches: u64,
-    /// Page faults of all threads that were served from memory.
-    pub minor_faults: u64,
-    /// Those served from disk.
-    pub major_faults: u64,
-}
-
-impl ProcessCounters {
-    /// The counters of a process; none if it has ended.
-    pub fn read(root: &SystemRoot, id: u32) -> Option<Self> {
-        let status = root.text(&format!("proc/{id}/status"))?;
-        let stat = root.text(&format!("proc/{id}/stat"))?;
-        Some(Self {
-            cpu_ns: root.cpu_time_ns(id),
-            voluntary_switches: status_counter(&status, "voluntary_ctxt_switches:")?,
-            involuntary_switches: status_counter(&status, "nonvoluntary_ctxt_switches:")?,
-            minor_faults: stat_field(&stat, 10)?.parse().ok()?,
-            major_faults: stat_field(&stat, 12)?.parse().ok()?,
-        })
-    }
-}
-
 fn status_counter(status: &str, name: &str) -> Option<u64> {
     status.lines().find_map(|line| line.strip_prefix(name))?.trim().parse().ok()
 }
@@ -49,20 +19,22 @@ fn stat_field(stat: &str, number: usize) -> Option<&str> {
     stat.rsplit_once(')')?.1.split_whitespace().nth(number - 3)
 }
 
-/// The kernel's counters of a thread.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct ThreadCounters {
-    /// CPU time, ns; `None` if the kernel has no statistics of its scheduler.
+/// The kernel's counters of a process, or of one of its threads.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// CPU time, ns, of a process that of all threads that run; `None` if the kernel has no statistics of its scheduler.
     pub cpu_ns: Option<u64>,
-    /// Time for which it was ready and had no core, ns; none as above. It grows when the thread gets a core.
+    /// Time for which the thread was ready and had no core, ns; none as above. It grows when the thread gets a core.
     pub queued_ns: Option<u64>,
-    /// Context switches that it asked for by waiting.
+    /// Context switches that the thread, of a process the main one, asked for by waiting.
     pub voluntary_switches: u64,
     /// Those that it did not ask for.
     pub involuntary_switches: u64,
-    /// Page faults that were served from disk.
+    /// Page faults, of a process those of all threads, that were served from memory.
+    pub minor_faults: u64,
+    /// Those served from disk.
     pub major_faults: u64,
-    /// The core on which it ran last.
+    /// The core on which the thread ran last.
     pub core: usize,
     /// Whether a signal or a debugger has stopped it.
     pub is_stopped: bool,
@@ -70,10 +42,19 @@ pub struct ThreadCounters {
     pub is_real_time: bool,
 }
 
-impl ThreadCounters {
+impl Counters {
+    /// The counters of a process; none if it has ended.
+    pub fn of_process(root: &SystemRoot, id: u32) -> Option<Self> {
+        Some(Self { cpu_ns: Some(root.cpu_time_ns(id)), ..Self::read(root, &format!("proc/{id}"))? })
+    }
+
     /// The counters of a thread of a process; none if it has ended.
-    pub fn read(root: &SystemRoot, process: u32, thread: u32) -> Option<Self> {
-        let text = |file: &str| root.text(&format!("proc/{process}/task/{thread}/{file}"));
+    pub fn of_thread(root: &SystemRoot, process: u32, thread: u32) -> Option<Self> {
+        Self::read(root, &format!("proc/{process}/task/{thread}"))
+    }
+
+    fn read(root: &SystemRoot, folder: &str) -> Option<Self> {
+        let text = |file: &str| root.text(&format!("{folder}/{file}"));
         let (status, stat) = (text("status")?, text("stat")?);
         let schedule = text("schedstat").unwrap_or_default();
         let mut times_ns = schedule.split_whitespace().map_while(|time_ns| time_ns.parse().ok());
@@ -83,6 +64,7 @@ impl ThreadCounters {
             queued_ns: times_ns.next(),
             voluntary_switches: status_counter(&status, "voluntary_ctxt_switches:")?,
             involuntary_switches: status_counter(&status, "nonvoluntary_ctxt_switches:")?,
+            minor_faults: stat_field(&stat, 10)?.parse().ok()?,
             major_faults: stat_field(&stat, 12)?.parse().ok()?,
             core: stat_field(&stat, 39)?.parse().ok()?,
             is_stopped: matches!(stat_field(&stat, 3)?, "T" | "t"),
@@ -99,7 +81,7 @@ const REAL_TIME_POLICIES: [u32; 3] = [1, 2, 6];
 pub fn loop_thread(root: &SystemRoot, process: u32) -> Option<u32> {
     let threads = root.names(&format!("proc/{process}/task"));
     let rank = |thread: &u32| {
-        let counters = ThreadCounters::read(root, process, *thread)?;
+        let counters = Counters::of_thread(root, process, *thread)?;
         Some((counters.is_real_time, counters.voluntary_switches, Reverse(*thread)))
     };
     threads.into_iter().filter_map(|thread| thread.parse().ok()).max_by_key(rank)
@@ -138,7 +120,7 @@ pub struct Sample {
     /// Steal time of all cores since boot, if the kernel counts it.
     pub stolen_ns: Option<u64>,
     /// In the order given to the sampler; none for a process that has ended.
-    pub processes: Vec<Option<ProcessCounters>>,
+    pub processes: Vec<Option<Counters>>,
 }
 
 impl Sampler {
@@ -153,7 +135,7 @@ impl Sampler {
             return None;
         }
         self.next_ns = now_ns + self.interval_ns;
-        let counters = |id: &u32| ProcessCounters::read(&self.root, *id);
+        let counters = |id: &u32| Counters::of_process(&self.root, *id);
         Some(Sample {
             time_ns: now_ns,
             stolen_ns: stolen_ns(&self.root),
@@ -174,19 +156,23 @@ mod tests {
                 "proc/7/status",
                 "Name:\tmasseter\nvoluntary_ctxt_switches:\t9\nnonvoluntary_ctxt_switches:\t3\n",
             ),
-            ("proc/7/stat", "7 (a (b) c) S 1 7 7 0 -1 4194304 100 0 1 0 11 5 0 0 20 0"),
+            ("proc/7/schedstat", "750000000 500 9\n"),
+            ("proc/7/stat", &format!("7 (a (b) c) S 1 7 7 0 -1 4194304 100 0 1 {}1 80 0 0", "0 ".repeat(26))),
             ("proc/7/task/7/schedstat", "750000000 500 9\n"),
             ("proc/7/task/9/schedstat", "250000000 0 1\n"),
             ("proc/stat", "cpu  1 2 3 4 5 6 7 25 0 0\ncpu0 1 2 3 4 5 6 7 8 0 0\n"),
         ]);
         let mut sampler = Sampler::new(fixture.root(), vec![7, 8], 500, 1000);
         assert_eq!(sampler.sample(999), None);
-        let counters = ProcessCounters {
-            cpu_ns: 1_000_000_000,
+        let counters = Counters {
+            cpu_ns: Some(1_000_000_000),
+            queued_ns: Some(500),
             voluntary_switches: 9,
             involuntary_switches: 3,
             minor_faults: 100,
             major_faults: 1,
+            core: 1,
+            ..Counters::default()
         };
         let sample =
             Sample { time_ns: 1000, stolen_ns: Some(250_000_000), processes: vec![Some(counters), None] };
@@ -215,18 +201,19 @@ mod tests {
     #[test]
     fn the_counters_of_a_thread_are_its_own_and_a_kernel_may_lack_schedstat() {
         let fixture = root_of(&[thread(7, "R", 9, 1, true), thread(8, "T", 4, 0, false)]);
-        let main = ThreadCounters {
+        let main = Counters {
             cpu_ns: Some(750),
             queued_ns: Some(500),
             voluntary_switches: 9,
             involuntary_switches: 3,
+            minor_faults: 5,
             major_faults: 2,
             core: 1,
             is_stopped: false,
             is_real_time: true,
         };
-        assert_eq!(ThreadCounters::read(&fixture.root(), 7, 7), Some(main));
-        let other = ThreadCounters {
+        assert_eq!(Counters::of_thread(&fixture.root(), 7, 7), Some(main));
+        let other = Counters {
             cpu_ns: None,
             queued_ns: None,
             voluntary_switches: 4,
@@ -234,8 +221,8 @@ mod tests {
             is_real_time: false,
             ..main
         };
-        assert_eq!(ThreadCounters::read(&fixture.root(), 7, 8), Some(other));
-        assert_eq!(ThreadCounters::read(&fixture.root(), 7, 9), None);
+        assert_eq!(Counters::of_thread(&fixture.root(), 7, 8), Some(other));
+        assert_eq!(Counters::of_thread(&fixture.root(), 7, 9), None);
     }
 
     #[test]

@@ -257,19 +257,18 @@ impl InOrder {
 
 #[cfg(test)]
 mod tests {
-    use masseter_machine::counters::ProcessCounters;
+    use masseter_machine::counters::Counters;
     use masseter_runtime::messages::codes::Source;
 
     use super::*;
 
     #[test]
     fn a_message_holds_the_counters_of_both_loops_while_both_run() {
-        let counters = |involuntary_switches, minor_faults| ProcessCounters {
-            cpu_ns: 5,
-            voluntary_switches: 9,
+        let counters = |involuntary_switches, minor_faults| Counters {
             involuntary_switches,
             minor_faults,
             major_faults: 1,
+            ..Counters::default()
         };
         let processes = vec![Some(counters(3, 100)), Some(counters(4, 200))];
         let mut sample = Sample { time_ns: 1000, stolen_ns: Some(25), processes };
