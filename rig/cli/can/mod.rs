@@ -19,30 +19,22 @@ pub(crate) enum CanVerb {
     /// Print the load and the worst-case response times of every bus
     Plan(PlanArgs),
     /// Print the electronic data sheet (EDS, CiA 306) of a drive
-    Eds(EdsArgs),
+    #[command(after_help = "Example:\n  masseter can eds --axis l1 > l1.eds")]
+    Eds {
+        /// Scenario file with the drives [default: the published rig]
+        scenario: Option<PathBuf>,
+        /// Axis of the drive
+        #[arg(long, default_value = "d1", value_parser = PossibleValuesParser::new(AXIS_NAMES).map(|name| axis_of(&name)))]
+        axis: usize,
+    },
     /// Print the messages of the link as a DBC file
-    Dbc(DbcArgs),
+    #[command(after_help = "Example:\n  masseter can dbc > masseter.dbc")]
+    Dbc {
+        /// Scenario file with the drives [default: the published rig]
+        scenario: Option<PathBuf>,
+    },
     /// Serve the simulated buses and drives to other tools (socketcand protocol)
     Serve(serve::ServeArgs),
-}
-
-/// The arguments of `can eds`.
-#[derive(Debug, Clone, Args)]
-#[command(after_help = "Example:\n  masseter can eds --axis l1 > l1.eds")]
-pub(crate) struct EdsArgs {
-    /// Scenario file with the drives [default: the published rig]
-    scenario: Option<PathBuf>,
-    /// Axis of the drive
-    #[arg(long, default_value = "d1", value_parser = PossibleValuesParser::new(AXIS_NAMES).map(|name| axis_of(&name)))]
-    axis: usize,
-}
-
-/// The arguments of `can dbc`.
-#[derive(Debug, Clone, Args)]
-#[command(after_help = "Example:\n  masseter can dbc > masseter.dbc")]
-pub(crate) struct DbcArgs {
-    /// Scenario file with the drives [default: the published rig]
-    scenario: Option<PathBuf>,
 }
 
 /// The arguments of `can plan`.
@@ -63,13 +55,12 @@ pub(crate) struct PlanArgs {
 pub(crate) fn execute(verb: &CanVerb) -> anyhow::Result<Exit> {
     match verb {
         CanVerb::Plan(args) => plan(args),
-        CanVerb::Eds(args) => {
-            let sheets = description::eds(&read_scenario(args.scenario.as_deref())?)?;
-            result(&sheets[args.axis])?;
+        CanVerb::Eds { scenario, axis } => {
+            result(&description::eds(&read_scenario(scenario.as_deref())?)?[*axis])?;
             Ok(Exit::Passed)
         }
-        CanVerb::Dbc(args) => {
-            result(&description::dbc(&read_scenario(args.scenario.as_deref())?)?)?;
+        CanVerb::Dbc { scenario } => {
+            result(&description::dbc(&read_scenario(scenario.as_deref())?)?)?;
             Ok(Exit::Passed)
         }
         CanVerb::Serve(args) => serve::serve(args),
