@@ -4,9 +4,6 @@ use std::fmt::Write as _;
 use std::io::Write;
 use std::process::{Command, Output, Stdio};
 
-use masseter_controller::kinematics::Equations;
-use masseter_model::geometry::{Actuators, Mechanism, MechanismConfig};
-
 use crate::common::{MASSETER, masseter, stderr, stdout};
 
 fn pipe(arguments: &[&str], input: &str) -> Output {
@@ -165,7 +162,7 @@ fn all_solutions_of_the_neutral_input_are_listed_with_their_conditions() {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
     let output = stdout(&output);
     let (header, lines) = output.split_once('\n').unwrap();
-    assert!(header.starts_with("line,x_m,") && header.ends_with(",nearest_m,status"), "{header}");
+    assert!(header.starts_with("line,x_m,") && header.ends_with(",residual_m,status"), "{header}");
     assert_eq!(lines.lines().count(), 16);
     let true_ones: Vec<_> = lines.lines().filter(|line| line.ends_with(",true")).collect();
     assert_eq!(true_ones.len(), 1);
@@ -198,29 +195,14 @@ fn solutions_that_rounding_cannot_separate_are_both_marked_singular() {
     assert!(of_line("3").iter().all(|(_, status)| status != "singular"));
 }
 
-/// Least root of the error on a grid of all leg angles, 5° apart.
-fn nearest_on_a_grid_m(actuators: &Actuators) -> f64 {
-    let mechanism = Mechanism::new(&MechanismConfig::default()).unwrap();
-    let equations = Equations::new(&mechanism, actuators);
-    let angle = |index: u32| f64::from(5 * index).to_radians();
-    let mut least_m2 = f64::INFINITY;
-    for index in 0..72 * 72 * 72 {
-        let theta = [angle(index % 72), angle(index / 72 % 72), angle(index / 72 / 72)];
-        least_m2 = least_m2.min(equations.evaluate(theta.into()).error_m2());
-    }
-    least_m2.sqrt()
-}
-
 #[test]
-fn an_input_without_any_solution_says_how_far_it_is_from_one() {
+fn an_input_without_any_solution_gives_one_line_with_the_reason() {
     let output = pipe(&["fk", "--all"], &format!("{ACTUATORS}0,0,0,0.01,0.30,0.30\n"));
-    let line = stdout(&output).lines().nth(1).unwrap().to_owned();
-    assert!(line.starts_with("2,,,") && line.ends_with(",unassemblable"), "{line}");
-    let nearest_m: f64 = line.rsplit(',').nth(1).unwrap().parse().unwrap();
-    let on_grid_m = nearest_on_a_grid_m(&Actuators { slide_m: [0.0; 3], leg_m: [0.01, 0.30, 0.30] });
-    // Half a grid step, 0.0436 rad, moves the corners by 0.4 and 13 mm, hence the sides by at most
-    // 13.5, 26.2 and 13.5 mm, and the root of their squares by 33 mm.
-    assert!((on_grid_m - 0.033..=on_grid_m).contains(&nearest_m), "{nearest_m}, on the grid {on_grid_m}");
+    let lines: Vec<_> = stdout(&output).lines().skip(1).map(str::to_owned).collect();
+    assert!(
+        lines.len() == 1 && lines[0].starts_with("2,,,") && lines[0].ends_with(",,unassemblable"),
+        "{lines:?}"
+    );
 }
 
 #[test]

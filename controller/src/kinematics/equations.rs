@@ -93,14 +93,9 @@ pub(super) fn directions(
 }
 
 impl Evaluation {
-    /// f₁² + f₂² + f₃² (the paper, eq. 2), here in m².
-    pub fn error_m2(&self) -> f64 {
-        self.residual_m.norm_squared()
-    }
-
-    /// The error in the paper's unit, cm².
+    /// f₁² + f₂² + f₃² (the paper, eq. 2), cm².
     pub fn error_cm2(&self) -> f64 {
-        self.error_m2() * 1e4
+        self.residual_m.norm_squared() * 1e4
     }
 
     /// The largest |fₖ|, metres; NaN as soon as one is NaN.

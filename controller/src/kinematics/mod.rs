@@ -23,7 +23,7 @@ mod tracker;
 pub use certificate::Certificate;
 pub use equations::{Equations, Evaluation};
 pub use solution::{Assembly, Condition, ForwardError, Solution};
-pub use solutions::{MOST_SOLUTIONS, Solutions, nearest_assembly_m};
+pub use solutions::{MOST_SOLUTIONS, Solutions};
 pub use solver::{
     Iteration, MAX_HALVINGS, MAX_ITERATIONS, Method, Options, Residual, StepRule, solve, solve_traced,
 };

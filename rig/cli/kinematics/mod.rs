@@ -9,7 +9,7 @@ mod table;
 use std::iter;
 
 use masseter_controller::kinematics::{
-    Assembly, ForwardError, ForwardTracker, Method, Options, Solution, Solutions, nearest_assembly_m, solve,
+    Assembly, ForwardError, ForwardTracker, Method, Options, Solution, Solutions, solve,
 };
 use masseter_model::geometry::{
     AXES, Actuators, Conditioning, InverseError, Jacobian, Joints, LEGS, Mechanism, Pose, StrokeLimits,
@@ -32,7 +32,7 @@ const FORWARD: Columns = Columns {
 const EVERY: Columns = Columns {
     read: ACTUATORS,
     written: "line,x_m,y_m,z_m,qw,qx,qy,qz,theta1_rad,theta2_rad,theta3_rad,legs_above_base,hinges_below_platform,\
-              corners_in_order,positive_determinant,separation_rad,determinant,condition,residual_m,nearest_m",
+              corners_in_order,positive_determinant,separation_rad,determinant,condition,residual_m",
 };
 const INVERSE: Columns = Columns {
     read: "x_m,y_m,z_m,qw,qx,qy,qz",
@@ -180,12 +180,11 @@ fn parse_guess(text: &str) -> Result<[f64; 3], &'static str> {
 
 /// The status of a solution is `true` if the mechanism can stand in it, `singular` if double precision does not
 /// separate it from another (both are written), and otherwise `other`. An input without a solution gives one line
-/// with the reason of [`ForwardError`]; `nearest_m` is then the least root of the error (the paper, eq. 2) over all
-/// leg angles.
+/// with the reason of [`ForwardError`].
 fn every_solution(args: &CsvArgs, mechanism: &Mechanism) -> anyhow::Result<Exit> {
     convert(args, EVERY, |line, values, lines| {
         if is_out_of_range(line, &values, lines) {
-            write_none(line, f64::NAN, OUT_OF_RANGE, lines);
+            lines.row([line as f64], OUT_OF_RANGE);
             return Ok(());
         }
         let actuators = Actuators::from_axes(values);
@@ -196,11 +195,8 @@ fn every_solution(args: &CsvArgs, mechanism: &Mechanism) -> anyhow::Result<Exit>
                     lines.row(iter::once(line as f64).chain(values), status_among_all(solution));
                 }
             }
-            Ok(_) => {
-                let nearest_m = nearest_assembly_m(mechanism, &actuators);
-                write_none(line, nearest_m, ForwardError::Unassemblable.reason(), lines);
-            }
-            Err(error) => write_none(line, f64::NAN, error.reason(), lines),
+            Ok(_) => lines.row([line as f64], ForwardError::Unassemblable.reason()),
+            Err(error) => lines.row([line as f64], error.reason()),
         }
         Ok(())
     })
@@ -212,12 +208,6 @@ fn status_among_all(solution: &Solution) -> &'static str {
         (Some(_), true) => "true",
         (Some(_), false) => "other",
     }
-}
-
-fn write_none(line: u64, nearest_m: f64, reason: &str, lines: &mut Lines) {
-    let absent = EVERY.written.split(',').count() - 2;
-    let values = iter::once(line as f64).chain(iter::repeat_n(f64::NAN, absent)).chain([nearest_m]);
-    lines.row(values, reason);
 }
 
 /// The values after the line.
@@ -237,7 +227,7 @@ fn values_of(
     let separation_rad = solutions.separation_rad(solution).unwrap_or(f64::NAN);
     // Of actuator rates to the platform's twist.
     let condition = Conditioning::new(&Jacobian::new(mechanism, &solution.pose, &joints)).number();
-    let quality = [separation_rad, solution.determinant, condition, solution.residual_m, 0.0];
+    let quality = [separation_rad, solution.determinant, condition, solution.residual_m];
     let pose = position_m.into_iter().chain(quaternion).chain(solution.theta_rad);
     pose.chain(conditions.map(f64::from)).chain(quality)
 }
