@@ -1,8 +1,9 @@
 //! Warnings about a recording that may not be the motion of a jaw. The user decides.
 
 use masseter_model::geometry::Vec3;
-use nalgebra::Vector6;
 use serde::Serialize;
+
+use super::row::Sample;
 
 /// Longest glide of markers without a turn, m, and the least turn to a longer one, °/m: a sixth of an opening's.
 pub(super) const GLIDE_M: f64 = 0.012;
@@ -22,39 +23,6 @@ const AROUND: usize = 4;
 /// Largest distance of the rows of one glitch.
 const ONE: usize = 3;
 
-/// The original rows of a recording: translation of the incisal point (m) from the closed pose, and rotation vector
-/// (rad) from the first row's orientation.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Rows<'a> {
-    pub time_s: &'a [f64],
-    pub lines: &'a [u64],
-    pub coordinates: &'a [Vector6<f64>],
-    /// The first row's turn from the closed pose, rad.
-    pub first_turn_rad: f64,
-}
-
-impl Rows<'_> {
-    /// Place of the incisal point in a row, m.
-    fn place_m(&self, row: usize) -> Vec3 {
-        self.coordinates[row].fixed_rows::<3>(0).into_owned()
-    }
-
-    /// Its turn from the first row, rad.
-    fn turn_rad(&self, row: usize) -> f64 {
-        self.coordinates[row].fixed_rows::<3>(3).norm()
-    }
-
-    /// Its way from the first row, m.
-    fn way_m(&self, row: usize) -> f64 {
-        (self.place_m(row) - self.place_m(0)).norm()
-    }
-
-    /// The row furthest from the first.
-    fn farthest(&self) -> usize {
-        (0..self.lines.len()).max_by(|&a, &b| self.way_m(a).total_cmp(&self.way_m(b))).unwrap_or_default()
-    }
-}
-
 /// The largest value but for a hundredth of the rows and two, with its row: a glitch is no unit.
 pub(super) fn largest(values: &[f64]) -> (usize, f64) {
     quantile(values, 2 + values.len() / 100)
@@ -68,14 +36,14 @@ pub(super) fn quantile(values: &[f64], above: usize) -> (usize, f64) {
 }
 
 /// The doubts about the rows, each with a line, without glitches.
-pub(super) fn doubts(rows: &Rows) -> Vec<String> {
-    not_closed(rows).into_iter().chain(ways(rows)).collect()
+pub(super) fn doubts(samples: &[Sample]) -> Vec<String> {
+    not_closed(&samples[0]).into_iter().chain(ways(samples)).collect()
 }
 
-fn not_closed(rows: &Rows) -> Option<String> {
-    let (away_m, line) = (rows.place_m(0).norm(), rows.lines[0]);
-    let (away_mm, turn_deg) = (away_m * 1e3, rows.first_turn_rad.to_degrees());
-    (away_m > CLOSED_M || rows.first_turn_rad > CLOSED_RAD).then(|| {
+fn not_closed(first: &Sample) -> Option<String> {
+    let (away_m, turn_rad) = (place_m(first).norm(), first.displacement.rotation.angle());
+    let (line, away_mm, turn_deg) = (first.line, away_m * 1e3, turn_rad.to_degrees());
+    (away_m > CLOSED_M || turn_rad > CLOSED_RAD).then(|| {
         format!(
             "line {line}: the first row is {away_mm:.1} mm and {turn_deg:.1}° from the closed jaw; are the poses relative \
              to the closed jaw, and the quaternions in the order qw,qx,qy,qz?"
@@ -83,10 +51,12 @@ fn not_closed(rows: &Rows) -> Option<String> {
     })
 }
 
-fn ways(rows: &Rows) -> Option<String> {
-    let farthest = rows.farthest();
-    let (way_m, line) = (rows.way_m(farthest), rows.lines[farthest]);
-    let turn_rad = (0..rows.lines.len()).map(|row| rows.turn_rad(row)).fold(0.0, f64::max);
+fn ways(samples: &[Sample]) -> Option<String> {
+    let first = &samples[0];
+    let way = |sample: &Sample| ((place_m(sample) - place_m(first)).norm(), sample.line);
+    let (way_m, line) = samples.iter().map(way).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let turn = |sample: &Sample| first.displacement.rotation.angle_to(&sample.displacement.rotation);
+    let turn_rad = samples.iter().map(turn).fold(0.0, f64::max);
     let (way_mm, turn_deg) = (way_m * 1e3, turn_rad.to_degrees());
     if way_m > GLIDE_M && turn_deg < TURN_DEG_PER_M * way_m {
         return Some(format!(
@@ -95,6 +65,11 @@ fn ways(rows: &Rows) -> Option<String> {
         ));
     }
     (way_m < NOTHING_M && turn_rad < NOTHING_M).then(|| format!("line {line}: the jaw does not move"))
+}
+
+/// Place of the incisal point, m.
+fn place_m(sample: &Sample) -> Vec3 {
+    sample.displacement.translation.vector
 }
 
 /// One warning for all glitches.
@@ -129,10 +104,10 @@ pub struct Glitch {
 }
 
 /// All glitches, in the order of their rows.
-pub(super) fn glitches(rows: &Rows) -> Vec<Glitch> {
-    let steps = Steps::new(rows);
+pub(super) fn glitches(samples: &[Sample]) -> Vec<Glitch> {
+    let steps = Steps::new(samples);
     let mut found: Vec<usize> = Vec::new();
-    for row in (1..rows.lines.len().saturating_sub(1)).filter(|&row| steps.is_glitch(row)) {
+    for row in (1..samples.len().saturating_sub(1)).filter(|&row| steps.is_glitch(row)) {
         match found.last_mut() {
             Some(last) if row - *last <= ONE => {
                 if steps.deviation_m[row] > steps.deviation_m[*last] {
@@ -142,17 +117,17 @@ pub(super) fn glitches(rows: &Rows) -> Vec<Glitch> {
             _ => found.push(row),
         }
     }
-    found.into_iter().map(|row| glitch(rows, row)).collect()
+    found.into_iter().map(|row| glitch(samples, row)).collect()
 }
 
-fn glitch(rows: &Rows, row: usize) -> Glitch {
-    let jump_m = |to: usize| (rows.place_m(to) - rows.place_m(to - 1)).norm();
+fn glitch(samples: &[Sample], row: usize) -> Glitch {
+    let jump_m = |to: usize| (place_m(&samples[to]) - place_m(&samples[to - 1])).norm();
     let to = if jump_m(row) >= jump_m(row + 1) { row } else { row + 1 };
     Glitch {
-        line: rows.lines[row],
-        time_s: rows.time_s[row],
+        line: samples[row].line,
+        time_s: samples[row].time_s - samples[0].time_s,
         jump_m: jump_m(to),
-        within_s: rows.time_s[to] - rows.time_s[to - 1],
+        within_s: samples[to].time_s - samples[to - 1].time_s,
     }
 }
 
@@ -165,16 +140,16 @@ struct Steps {
 }
 
 impl Steps {
-    fn new(rows: &Rows) -> Self {
-        let places: Vec<Vec3> = (0..rows.lines.len()).map(|row| rows.place_m(row)).collect();
-        let (mut deviation_m, mut speed_m_s) = (vec![0.0; places.len()], vec![0.0; places.len()]);
-        for row in 1..places.len() {
-            let step_s = rows.time_s[row] - rows.time_s[row - 1];
-            speed_m_s[row] = (places[row] - places[row - 1]).norm() / step_s;
-            if row + 1 < places.len() {
-                let share = step_s / (rows.time_s[row + 1] - rows.time_s[row - 1]);
-                deviation_m[row] = (places[row] - places[row - 1].lerp(&places[row + 1], share)).norm();
-            }
+    fn new(samples: &[Sample]) -> Self {
+        let (mut deviation_m, mut speed_m_s) = (vec![0.0; samples.len()], vec![0.0; samples.len()]);
+        for (at, pair) in samples.windows(2).enumerate() {
+            let way_m = (place_m(&pair[1]) - place_m(&pair[0])).norm();
+            speed_m_s[at + 1] = way_m / (pair[1].time_s - pair[0].time_s);
+        }
+        for (at, three) in samples.windows(3).enumerate() {
+            let share = (three[1].time_s - three[0].time_s) / (three[2].time_s - three[0].time_s);
+            let between_m = place_m(&three[0]).lerp(&place_m(&three[2]), share);
+            deviation_m[at + 1] = (place_m(&three[1]) - between_m).norm();
         }
         Self { deviation_m, speed_m_s }
     }
@@ -208,21 +183,31 @@ pub(super) fn upper_median(values: &[f64]) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use masseter_model::geometry::Pose;
+    use nalgebra::{UnitQuaternion, Vector6};
+
     use super::*;
+
+    /// Rows of translations (m) and rotation vectors (rad) at this rate, from line 2 on.
+    fn samples(rate_hz: f64, rows: impl Iterator<Item = Vector6<f64>>) -> Vec<Sample> {
+        let sample = |(row, at): (u32, Vector6<f64>)| {
+            let (place_m, turn_rad) = (Vec3::new(at[0], at[1], at[2]), Vec3::new(at[3], at[4], at[5]));
+            let displacement = Pose::from_parts(place_m.into(), UnitQuaternion::from_scaled_axis(turn_rad));
+            Sample { line: u64::from(row) + 2, time_s: f64::from(row) / rate_hz, displacement }
+        };
+        (0..).zip(rows).map(sample).collect()
+    }
 
     /// Chewing at 2 Hz by 18 mm, sampled at this rate.
     fn doubts_of(rate_hz: f64, change: impl Fn(usize, &mut Vector6<f64>)) -> Vec<String> {
-        let time_s: Vec<f64> = (0..200).map(|k| f64::from(k) / rate_hz).collect();
-        let pose = |(row, t_s): (usize, &f64)| {
+        let pose = |row: usize| {
             let mut pose = Vector6::zeros();
-            pose[2] = -0.009 * (1.0 - (4.0 * std::f64::consts::PI * t_s).cos());
+            pose[2] = -0.009 * (1.0 - (4.0 * std::f64::consts::PI * row as f64 / rate_hz).cos());
             pose[4] = -10.0 * pose[2];
             change(row, &mut pose);
             pose
         };
-        let rows: Vec<_> = time_s.iter().enumerate().map(pose).collect();
-        let lines: Vec<_> = (2..202).collect();
-        let rows = Rows { time_s: &time_s, lines: &lines, coordinates: &rows, first_turn_rad: 0.0 };
+        let rows = samples(rate_hz, (0..200).map(pose));
         doubts(&rows).into_iter().chain(jumps(&glitches(&rows))).collect()
     }
 
@@ -256,14 +241,11 @@ mod tests {
 
     /// Two seconds of a motion of the incisal point, mm, from line 2 on.
     fn found(motion_mm: impl Fn(f64) -> [f64; 3]) -> Vec<Glitch> {
-        let time_s: Vec<f64> = (0..100).map(|k| f64::from(k) / RATE_HZ).collect();
-        let place = |&t_s: &f64| {
-            let [x, y, z] = motion_mm(t_s).map(|mm| mm / 1e3);
+        let place = |row: u32| {
+            let [x, y, z] = motion_mm(f64::from(row) / RATE_HZ).map(|mm| mm / 1e3);
             Vector6::new(x, y, z, 0.0, 0.0, 0.0)
         };
-        let coordinates: Vec<_> = time_s.iter().map(place).collect();
-        let lines: Vec<_> = (2..102).collect();
-        glitches(&Rows { time_s: &time_s, lines: &lines, coordinates: &coordinates, first_turn_rad: 0.0 })
+        glitches(&samples(RATE_HZ, (0..100).map(place)))
     }
 
     fn is_at(t_s: f64, at_s: f64) -> bool {

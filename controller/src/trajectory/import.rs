@@ -11,8 +11,8 @@ use masseter_scenario::input::{foreign_text, read_bytes};
 use masseter_scenario::{FileConfig, JawConfig};
 use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 
-use super::recording::{Recording, Sample};
-use super::row::{Located, Row};
+use super::recording::Recording;
+use super::row::{Located, Row, Sample};
 use super::table::{Format, LARGEST_MM, Table};
 use super::{TrajectoryError, c3d, mandible::condylar_middle, markers::Body, ranges_of, require};
 

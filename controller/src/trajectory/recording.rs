@@ -9,8 +9,8 @@ use std::path::PathBuf;
 use masseter_model::geometry::{Pose, Vec3};
 use nalgebra::{SVector, UnitQuaternion, Vector6};
 
-use super::doubts::{Glitch, Rows, doubts, glitches};
-use super::row::Located;
+use super::doubts::{Glitch, doubts, glitches};
+use super::row::{Located, Sample};
 
 /// Least rate of the even grid, Hz, well above the frequencies of a jaw. Faster samples keep their rate, because a
 /// slower grid turns their high frequencies into slow motion, which the filter passes.
@@ -22,26 +22,6 @@ const CENTROID_TURN_DEG: f64 = 2.0;
 const LARGEST_TURN_DEG: f64 = 90.0;
 /// Length of the reflected ends, in periods of the corner frequency.
 const MARGIN_PERIODS: f64 = 3.0;
-
-/// A row of the file: jaw displacement in the jaw frame, metres.
-#[derive(Debug)]
-pub(super) struct Sample {
-    pub line: u64,
-    pub time_s: f64,
-    pub displacement: Pose,
-}
-
-impl Sample {
-    /// How far a point of the jaw has moved from its place in the closed jaw, m.
-    pub(super) fn way(&self, point: &Vec3) -> Vec3 {
-        moved(&self.displacement, point)
-    }
-}
-
-/// How far a displacement moves a point, m.
-pub(super) fn moved(displacement: &Pose, point: &Vec3) -> Vec3 {
-    displacement.rotation * point + displacement.translation.vector - point
-}
 
 /// Jaw displacements over the recording's own time, from 0.
 #[derive(Debug, Clone)]
@@ -78,16 +58,12 @@ impl Recording {
         let largest_turn_deg = turns_deg.fold(0.0, f64::max);
         let is_bad = are_of_centroid && largest_turn_deg > CENTROID_TURN_DEG;
         let time_s: Vec<f64> = samples.iter().map(|sample| sample.time_s - first.time_s).collect();
-        let lines: Vec<_> = samples.iter().map(|sample| sample.line).collect();
-        let first_turn_rad = first_rotation.angle();
-        let rows = Rows { time_s: &time_s, lines: &lines, coordinates: &coordinates, first_turn_rad };
-        let (doubts, glitches) = (doubts(&rows), glitches(&rows));
         let raw = Spline::through(time_s.clone(), coordinates);
         Ok(Self {
             path,
-            lines,
-            doubts,
-            glitches,
+            lines: samples.iter().map(|sample| sample.line).collect(),
+            doubts: doubts(samples),
+            glitches: glitches(samples),
             first_rotation,
             curve: if lowpass_hz == 0.0 { raw.clone() } else { smoothed(&raw, &time_s, lowpass_hz) },
             raw,

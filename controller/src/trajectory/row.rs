@@ -4,6 +4,7 @@
 
 use std::path::Path;
 
+use masseter_model::geometry::{Pose, Vec3};
 use masseter_scenario::wording::counted;
 
 use super::TrajectoryError;
@@ -18,6 +19,26 @@ pub(super) struct Row {
     pub line: u64,
     pub time_s: f64,
     pub values: Vec<f64>,
+}
+
+/// A row in the jaw frame: displacement of the jaw, m.
+#[derive(Debug)]
+pub(super) struct Sample {
+    pub line: u64,
+    pub time_s: f64,
+    pub displacement: Pose,
+}
+
+impl Sample {
+    /// How far a point of the jaw has moved from its place in the closed jaw, m.
+    pub(super) fn way(&self, point: &Vec3) -> Vec3 {
+        moved(&self.displacement, point)
+    }
+}
+
+/// How far a displacement moves a point, m.
+pub(super) fn moved(displacement: &Pose, point: &Vec3) -> Vec3 {
+    displacement.rotation * point + displacement.translation.vector - point
 }
 
 /// A problem of a recording, before its path is known.

@@ -12,7 +12,8 @@ use super::frames::Frames;
 use super::import::Source;
 use super::mandible::jaw_points;
 use super::plausible::{Implausible, Judgement};
-use super::recording::{Recording, Sample, moved};
+use super::recording::Recording;
+use super::row::{Sample, moved};
 use super::table::{Format, Table};
 use super::units::Unit;
 
