@@ -99,7 +99,7 @@ pub struct Gap {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Range {
     /// The quantity.
-    pub name: &'static str,
+    pub name: String,
     /// The least value.
     pub least: f64,
     /// The greatest value.
@@ -219,16 +219,19 @@ fn steps_and_gaps(table: &Table) -> (StepFigures, Vec<Gap>) {
 
 fn columns(table: &Table) -> Vec<Range> {
     let values = |column: usize| table.rows.iter().map(move |row| row.values[column]);
-    let names = table.columns()[1..].iter().enumerate();
+    let names = table.columns().into_iter().enumerate();
     names.map(|(column, name)| range(name, values(column))).collect()
 }
 
-fn range(name: &'static str, values: impl Iterator<Item = f64>) -> Range {
-    let outside = Range { name, least: f64::INFINITY, greatest: f64::NEG_INFINITY };
-    values.fold(outside, |range, value| Range {
-        name,
-        least: range.least.min(value),
-        greatest: range.greatest.max(value),
+fn range(name: impl Into<String>, values: impl Iterator<Item = f64>) -> Range {
+    let [least, greatest] = extent(values);
+    Range { name: name.into(), least, greatest }
+}
+
+/// The least and the greatest value.
+fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {
+    values.fold([f64::INFINITY, f64::NEG_INFINITY], |[least, greatest], value| {
+        [least.min(value), greatest.max(value)]
     })
 }
 
@@ -238,16 +241,14 @@ fn point_figures(
     recording: &Recording,
     point: usize,
 ) -> PointFigures {
-    let along: [Range; 3] = std::array::from_fn(|axis| {
-        range(POINTS[point], path.iter().map(|row| row.points_m[point][axis] * 1e3))
-    });
+    let along_mm = [0, 1, 2].map(|axis| extent(path.iter().map(|row| row.points_m[point][axis] * 1e3)));
     let played = |row: &SurveyRow| moved(&recording.displacement(row.time_s), &points[point]);
     let speed_m_s =
         |pair: &[SurveyRow]| (played(&pair[1]) - played(&pair[0])).norm() / (pair[1].time_s - pair[0].time_s);
     PointFigures {
         name: POINTS[point],
-        least_mm: std::array::from_fn(|axis| along[axis].least),
-        greatest_mm: std::array::from_fn(|axis| along[axis].greatest),
+        least_mm: along_mm.map(|[least_mm, _]| least_mm),
+        greatest_mm: along_mm.map(|[_, greatest_mm]| greatest_mm),
         farthest_mm: path.iter().map(|row| row.points_m[point].norm() * 1e3).fold(0.0, f64::max),
         fastest_mm_s: path.windows(2).map(speed_m_s).fold(0.0, f64::max) * 1e3,
     }

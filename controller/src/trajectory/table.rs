@@ -23,14 +23,13 @@ const DAY_S: f64 = 86_400.0;
 pub(super) const LARGEST_MM: f64 = 1e5;
 /// Largest element by which a matrix by its transpose differs from the identity by rounding.
 const MATRIX_TOLERANCE: f64 = 5e-3;
-const POSES: [&str; 8] = ["time_s", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"];
-const MARKERS: [&str; 37] = [
-    "time_s", "m1_x_mm", "m1_y_mm", "m1_z_mm", "m2_x_mm", "m2_y_mm", "m2_z_mm", "m3_x_mm", "m3_y_mm",
-    "m3_z_mm", "m4_x_mm", "m4_y_mm", "m4_z_mm", "m5_x_mm", "m5_y_mm", "m5_z_mm", "m6_x_mm", "m6_y_mm",
-    "m6_z_mm", "m7_x_mm", "m7_y_mm", "m7_z_mm", "m8_x_mm", "m8_y_mm", "m8_z_mm", "m9_x_mm", "m9_y_mm",
-    "m9_z_mm", "m10_x_mm", "m10_y_mm", "m10_z_mm", "m11_x_mm", "m11_y_mm", "m11_z_mm", "m12_x_mm",
-    "m12_y_mm", "m12_z_mm",
-];
+/// Columns of the plain form, after the time.
+const POSES: [&str; 7] = ["x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz"];
+
+/// The same of a file of markers.
+fn marker_column(at: usize) -> String {
+    format!("m{}_{}_mm", at / 3 + 1, ["x", "y", "z"][at % 3])
+}
 
 /// The content of a file.
 #[derive(Debug, Clone, PartialEq)]
@@ -113,11 +112,11 @@ impl Table {
         Ok(Self { format, rows, extras, protocol, doubts })
     }
 
-    /// The names in the plain form.
-    pub(super) fn columns(&self) -> &'static [&'static str] {
+    /// The names in the plain form, after the time.
+    pub(super) fn columns(&self) -> Vec<String> {
         match self.format {
-            Format::Poses => &POSES,
-            Format::Markers(_) => &MARKERS[..=self.rows[0].values.len()],
+            Format::Poses => POSES.map(str::to_owned).to_vec(),
+            Format::Markers(_) => (0..self.rows[0].values.len()).map(marker_column).collect(),
         }
     }
 
@@ -131,8 +130,8 @@ impl Table {
         for line in &self.protocol {
             let _ = writeln!(text, "# {line}");
         }
-        let extra = self.extras.names.iter().map(String::as_str);
-        text += &self.columns().iter().copied().chain(extra).collect::<Vec<_>>().join(",");
+        let names = [vec!["time_s".to_owned()], self.columns(), self.extras.names.clone()];
+        text += &names.concat().join(",");
         // A row without a pose is written where it has other columns.
         let lost = vec![f64::NAN; self.rows[0].values.len()];
         let mut poses = self.rows.iter().peekable();
@@ -182,12 +181,13 @@ impl Reader<'_> {
                 Some(values)
             }
         };
-        let columns = match layout.content {
-            Content::Poses { .. } => &POSES[1..4],
-            Content::Markers { .. } => &MARKERS[1..],
+        let (lengths, name): (_, fn(usize) -> String) = match layout.content {
+            Content::Poses { .. } => (3, |at| POSES[at].to_owned()),
+            Content::Markers { .. } => (usize::MAX, marker_column),
         };
-        let is_too_far = |(value, _): &(&f64, &&str)| value.abs() > LARGEST_MM;
-        if let Some((value, column)) = values.iter().flatten().zip(columns).find(is_too_far) {
+        let mut lengths_mm = values.iter().flatten().take(lengths).enumerate();
+        if let Some((at, value)) = lengths_mm.find(|(_, value)| value.abs() > LARGEST_MM) {
+            let column = name(at);
             return Err(format!(
                 "{column} is {value:e}, beyond ±{LARGEST_MM} mm; is the unit millimetres? (motion.length_unit)"
             ));

@@ -72,7 +72,7 @@ fn a_marker_lost_in_the_first_row_is_no_line_before_the_rows() {
         let x = if row == 0 { String::new() } else { format!("{row}") };
         format!("{},{x},0,0,{},0,0,{row},40,0\n", f64::from(row) / 100.0, row + 40)
     };
-    let columns = ["time_s"].into_iter().chain(MARKERS[1..10].iter().copied()).map(str::to_owned).collect();
+    let columns = ["time_s".to_owned()].into_iter().chain((0..9).map(marker_column)).collect();
     let config = FileConfig { columns: Some(columns), ..FileConfig::new("motion.csv") };
     let table = Table::parse(&(0..6).map(row).collect::<String>(), &config).ok().unwrap();
     assert_eq!(table.rows[0].line, 2);
