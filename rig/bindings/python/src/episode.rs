@@ -1,7 +1,5 @@
 //! An episode: a run of a scenario that begins with its motion, goes on step by step, and ends with the motion or a safe stop.
 
-use std::path::PathBuf;
-
 use anyhow::{bail, ensure};
 use masseter_judge::{EventRecord, Watch, requirements::check_requirements};
 use masseter_plan::{RunPlan, read_scenario_with, set_keys};
@@ -13,32 +11,24 @@ use crate::agent::{ActionKind, Agent, Exchange, Exchanged};
 /// What all episodes of an environment have in common.
 #[derive(Debug, Clone)]
 pub(crate) struct Settings {
-    pub(crate) scenario: Option<PathBuf>,
+    pub(crate) scenario: Option<std::path::PathBuf>,
     /// Each `KEY=VALUE`.
     pub(crate) set: Vec<String>,
     pub(crate) kind: ActionKind,
     /// Names of signals.
     pub(crate) observe: Vec<String>,
-    pub(crate) reward: Reward,
+    pub(crate) reward: Reward<String>,
     pub(crate) cycles_per_step: u32,
 }
 
-/// What the reward of a step is.
-#[derive(Debug, Clone)]
-pub(crate) enum Reward {
+/// What the reward of a step is, by names or by places.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Reward<N> {
     None,
     /// The mean of a signal over the cycles of the step, with this sign.
-    Signal(String, f64),
+    Signal(N, f64),
     /// The margin of a requirement so far.
-    Requirement(String),
-}
-
-/// The same, by its place.
-#[derive(Debug, Clone, Copy)]
-enum Goal {
-    None,
-    Signal(usize, f64),
-    Requirement(usize),
+    Requirement(N),
 }
 
 /// Why no step follows.
@@ -65,7 +55,7 @@ pub(crate) struct Episode {
     run: Run<Watch>,
     has_detour: bool,
     places: Vec<usize>,
-    goal: Goal,
+    reward: Reward<usize>,
     now: Now,
 }
 
@@ -112,10 +102,10 @@ impl Episode {
         let mut watch = Watch::new(&plan.scenario, &declared);
         let places: Vec<_> =
             settings.observe.iter().map(|name| watch.choose(name)).collect::<Result<_, _>>()?;
-        let goal = match &settings.reward {
-            Reward::None => Goal::None,
-            Reward::Signal(name, sign) => Goal::Signal(watch.choose(name)?, *sign),
-            Reward::Requirement(name) => Goal::Requirement(watch.requirement(name)?),
+        let reward = match &settings.reward {
+            Reward::None => Reward::None,
+            Reward::Signal(name, sign) => Reward::Signal(watch.choose(name)?, *sign),
+            Reward::Requirement(name) => Reward::Requirement(watch.requirement(name)?),
         };
         Ok(Self {
             kind: settings.kind,
@@ -125,7 +115,7 @@ impl Episode {
             has_detour: plan.scenario.force_control.is_some(),
             now: Now { observed: vec![0.0; places.len()], reward: 0.0, over: None },
             places,
-            goal,
+            reward,
         })
     }
 
@@ -165,14 +155,14 @@ impl Episode {
             };
             self.run.begin_cycle()?;
             cycles += 1.0;
-            if let Goal::Signal(..) = self.goal {
+            if let Reward::Signal(..) = self.reward {
                 self.look();
                 sum += self.now.reward;
             }
         }
-        let reward = match self.goal {
-            Goal::Signal(..) => sum / cycles,
-            Goal::None | Goal::Requirement(_) => {
+        let reward = match self.reward {
+            Reward::Signal(..) => sum / cycles,
+            Reward::None | Reward::Requirement(_) => {
                 self.look();
                 self.now.reward
             }
@@ -192,11 +182,11 @@ impl Episode {
                 *observed = values[*place];
             }
         }
-        self.now.reward = match self.goal {
-            Goal::None => 0.0,
-            Goal::Signal(place, sign) if values[place].is_finite() => sign * values[place],
-            Goal::Signal(..) => self.now.reward,
-            Goal::Requirement(place) => watch.margin(place).unwrap_or(0.0),
+        self.now.reward = match self.reward {
+            Reward::None => 0.0,
+            Reward::Signal(place, sign) if values[place].is_finite() => sign * values[place],
+            Reward::Signal(..) => self.now.reward,
+            Reward::Requirement(place) => watch.margin(place).unwrap_or(0.0),
         };
     }
 
