@@ -11,7 +11,6 @@ use masseter_runtime::named::{Declared, Parameter};
 use masseter_scenario::Scenario;
 use nalgebra::Translation3;
 
-use crate::force_control::ForceControl;
 use crate::forces::{Forces, twist_between};
 use crate::path_supervision::{PathSupervision, StartTolerance};
 use crate::playback::{Playback, Progress};
@@ -74,7 +73,7 @@ impl MotionController {
     pub fn new(scenario: &Scenario, mechanism: Mechanism, trajectory: Trajectory) -> Self {
         let closed_m = trajectory.closed_pose().translation.z;
         let law: Box<dyn PoseLaw> = match scenario.force_control {
-            Some(config) => Box::new(ForceControl::new(scenario, config, closed_m)),
+            Some(config) => Box::new(crate::force_control::ForceControl::new(scenario, config, closed_m)),
             None => Box::new(PoseControl::new(&scenario.controller, scenario.rate_hz)),
         };
         Self::with_law(scenario, mechanism, trajectory, law)

@@ -4,10 +4,8 @@
 //! calibration). The trim adds no damping and no feed-forward.
 
 use masseter_model::geometry::{Pose, Vec3};
-use masseter_runtime::control::NoBranch;
 use masseter_runtime::named::{Declared, Parameter};
 use masseter_scenario::ControllerConfig;
-use nalgebra::UnitQuaternion;
 
 use crate::pose_law::{Demand, LawFailed, PoseLaw};
 
@@ -40,7 +38,7 @@ impl PoseControl {
     fn correct(&self, desired: &Pose) -> Pose {
         Pose::from_parts(
             (desired.translation.vector + self.position_m).into(),
-            UnitQuaternion::from_scaled_axis(self.rotation_rad) * desired.rotation,
+            nalgebra::UnitQuaternion::from_scaled_axis(self.rotation_rad) * desired.rotation,
         )
     }
 }
@@ -81,7 +79,7 @@ impl PoseLaw for PoseControl {
         }
     }
 
-    fn branch(&self) -> Result<Box<dyn PoseLaw>, NoBranch> {
+    fn branch(&self) -> Result<Box<dyn PoseLaw>, masseter_runtime::control::NoBranch> {
         Ok(Box::new(self.clone()))
     }
 }

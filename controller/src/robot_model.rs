@@ -2,7 +2,6 @@
 //! and the motion. Poses are those of the platform in the base frame. A twist is the velocity of the platform's origin
 //! (m/s), then the angular velocity (rad/s), in base axes. Axes are in the order d₁ d₂ d₃ l₁ l₂ l₃.
 
-use masseter_model::dynamics::Motion;
 use masseter_model::geometry::{
     AXES, Actuators, GeometryError, InverseError, Jacobian, Mechanism, Pose, Twist,
 };
@@ -11,7 +10,6 @@ use nalgebra::Vector6;
 
 use crate::forces::{Model, derivatives};
 use crate::kinematics::{ForwardError, ForwardTracker};
-use crate::pose_law::asked_pose;
 use crate::trajectory::{Trajectory, TrajectoryError, interpolate, minimum_jerk};
 
 /// Largest error of the length of a unit quaternion that a caller gives.
@@ -133,7 +131,7 @@ impl RobotModel {
     /// # Errors
     /// [`RobotModelError::NoRotation`] for a quaternion whose length is not 1.
     pub fn pose(position_m: [f64; 3], quaternion_wxyz: [f64; 4]) -> Result<Pose, RobotModelError> {
-        let pose = asked_pose(position_m, quaternion_wxyz);
+        let pose = crate::pose_law::asked_pose(position_m, quaternion_wxyz);
         let norm = pose.rotation.quaternion().norm();
         let is_rotation = (norm - 1.0).abs() < MOST_NORM_ERROR;
         if is_rotation { Ok(pose) } else { Err(RobotModelError::NoRotation(norm)) }
@@ -178,7 +176,7 @@ impl RobotModel {
         acceleration: &Twist,
         wrench: &Vector6<f64>,
     ) -> Result<[f64; AXES], RobotModelError> {
-        let motion = Motion::new(&self.model.mechanism, pose, twist)?;
+        let motion = masseter_model::dynamics::Motion::new(&self.model.mechanism, pose, twist)?;
         let force_n = self.model.force_n(&motion, acceleration, wrench);
         let is_finite = |force_n: &Vector6<f64>| force_n.iter().all(|force_n| force_n.is_finite());
         Ok(force_n.filter(is_finite).ok_or(RobotModelError::NoForces)?.into())

@@ -1,9 +1,6 @@
 //! From a law's requested pose to targets of the six axes within their limits.
 
-use std::hint::black_box;
-
 use masseter_model::geometry::{AXES, Actuators, Conditioning, Jacobian, Joints, Mechanism, Pose};
-use masseter_scenario::Scenario;
 
 use crate::safety::{self, Fault};
 use crate::sequencer::{Estimate, Sequencer};
@@ -27,7 +24,7 @@ pub(crate) struct Targets {
 }
 
 impl Targets {
-    pub(crate) fn new(scenario: &Scenario, mechanism: Mechanism) -> Self {
+    pub(crate) fn new(scenario: &masseter_scenario::Scenario, mechanism: Mechanism) -> Self {
         let config = &scenario.controller;
         Self {
             velocity_limit_m_s: std::array::from_fn(|axis| scenario.drives.of_axis(axis).max_velocity_m_s),
@@ -69,7 +66,7 @@ impl Targets {
         if let Some(estimate) = &sequencer.estimate {
             let solution = sequencer.tracker.clone().update(&estimate.measured);
             let joints = self.mechanism.inverse(&self.asked.unwrap_or(estimate.solution.pose));
-            let _ = black_box((solution, joints));
+            let _ = std::hint::black_box((solution, joints));
         }
     }
 }

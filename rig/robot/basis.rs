@@ -8,8 +8,6 @@ use masseter_scenario::Scenario;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
-use crate::BUILD;
-
 /// What a result depends on.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Basis {
@@ -40,7 +38,7 @@ impl Basis {
             "heartbeat_ms": can.heartbeat_consumer_ms, "process_data_ms": rpdo_timeout_ms(scenario)
         });
         let decided_by = json!({
-            "watchdogs": watchdogs, "axes": axes, "build": BUILD, "interfaces": can.interfaces, "jaw": jaw, "mechanism": mechanism
+            "watchdogs": watchdogs, "axes": axes, "build": crate::BUILD, "interfaces": can.interfaces, "jaw": jaw, "mechanism": mechanism
         });
         Self { decided_by, drives }
     }

@@ -1,8 +1,6 @@
 //! `masseter robot check-pose`: whether the six positions give the closed pose.
 
 use anyhow::{Context, anyhow, bail, ensure};
-use clap::Args;
-use masseter_controller::kinematics::Solutions;
 use masseter_controller::trajectory::{closed_jaw_points, closed_pose};
 use masseter_model::geometry::{
     AXES, AXIS_NAMES, Actuators, Conditioning, Jacobian, Joints, Mechanism, Pose, Vec3,
@@ -11,8 +9,6 @@ use masseter_plant::commissioning::{MotionError, Stand, stand};
 use masseter_runtime::{clock::MILLISECOND_NS, messages::pose_fields};
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, result_line};
-use serde::Serialize;
-use serde_json::json;
 
 use super::args::{RobotArgs, parse_length};
 use super::power_mark::{Marks, check_mark, mark_of_home};
@@ -28,7 +24,7 @@ const WIDEST_DEG: f64 = 5.0;
 const WRONG_M: f64 = 1e-3;
 
 /// The arguments of `robot check-pose`.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "Example:\n  masseter robot check-pose --tolerance 0.5mm --angle 0.5")]
 pub(crate) struct CheckPoseArgs {
     #[command(flatten)]
@@ -45,7 +41,7 @@ pub(crate) struct CheckPoseArgs {
 }
 
 /// What follows from six positions.
-#[derive(Debug, Serialize)]
+#[derive(Debug, serde::Serialize)]
 struct Found {
     positions_m: [f64; AXES],
     /// Of the platform.
@@ -89,7 +85,7 @@ pub(crate) fn check_pose(args: &CheckPoseArgs) -> Result<Exit, Failure> {
             checked.map(|()| Exit::Passed).map_err(failed)
         }
         Err(error) => {
-            let kept = json!({ "error": error.to_string(), "positions_m": stand.positions_m });
+            let kept = serde_json::json!({ "error": error.to_string(), "positions_m": stand.positions_m });
             session.finish_session(false, &kept)?;
             Err(failed(error))
         }
@@ -147,7 +143,7 @@ fn check_strokes(scenario: &Scenario, positions_m: &[f64; AXES]) -> anyhow::Resu
 
 /// The only true pose of six positions.
 fn pose_of(mechanism: &Mechanism, actuators: &Actuators) -> anyhow::Result<(Pose, Joints)> {
-    let solutions = Solutions::new(mechanism, actuators)?;
+    let solutions = masseter_controller::kinematics::Solutions::new(mechanism, actuators)?;
     let true_ones: Vec<_> = solutions.true_ones().collect();
     let fit = match true_ones[..] {
         [only] => return Ok((only.pose, Joints { actuators: *actuators, theta_rad: only.theta_rad })),

@@ -3,8 +3,6 @@
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{HomeReport, Wish, home as find};
 use masseter_terminal::{Exit, Failure, OrFailure, result_line};
-use serde::Serialize;
-use serde_json::json;
 
 use super::power_mark::{Homed, leave_mark};
 use super::{args::AxesArgs, robot_line::failed, session::Session, step::Step};
@@ -13,7 +11,7 @@ use super::{args::AxesArgs, robot_line::failed, session::Session, step::Step};
 const ORDER: [usize; AXES] = [3, 4, 5, 0, 1, 2];
 
 /// What is kept of one axis.
-#[derive(Debug, Serialize)]
+#[derive(Debug, serde::Serialize)]
 struct AxisResult {
     #[serde(flatten)]
     homed: Homed,
@@ -36,7 +34,7 @@ pub(crate) fn home(args: &AxesArgs) -> Result<Exit, Failure> {
         };
         print(axis, &report).incomplete()?;
         results.push(AxisResult { homed: Homed { axis: AXIS_NAMES[axis].to_owned(), mark: None }, report });
-        session.results = Some(json!(results));
+        session.results = Some(serde_json::json!(results));
     }
     let marked = leave_marks(&mut session, &axes, &mut results);
     session.finish_session(marked.is_ok(), &results)?;

@@ -5,7 +5,6 @@
 
 use std::{collections::BTreeMap, fmt::Write};
 
-use clap::Args;
 use masseter_can::{JudgedInterface, canopen::ObjectAddress};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{
@@ -13,23 +12,21 @@ use masseter_plant::commissioning::{
     judge_interfaces, object_name, reason_text,
 };
 use masseter_plant::description;
-use masseter_runtime::clock::SECOND_NS;
 use masseter_scenario::{DriveProfile, wording::counted};
 use masseter_terminal::{Exit, Failure, OrFailure, Tone, result_with_tones};
 use serde::Serialize;
-use serde_json::json;
 
 use super::ledger::{owed_advice, owed_axes};
 use super::robot_line::{RobotLine, axes_text, deviations_table, drives, failed};
 use super::{args::RobotArgs, evidence::StepFolder, step::Step};
 
 /// For how long the buses are listened to before the first question, ns.
-const LISTEN_NS: u64 = 2 * SECOND_NS;
+const LISTEN_NS: u64 = 2 * masseter_runtime::clock::SECOND_NS;
 
 const TONES: [(&str, Tone); 3] = [("passed", Tone::Good), ("failed", Tone::Bad), ("warning", Tone::Doubtful)];
 
 /// The arguments of `robot inspect`.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Example:
   masseter robot inspect robot.toml --can can0,can1
@@ -86,7 +83,7 @@ pub(crate) fn inspect(args: &InspectArgs) -> Result<Exit, Failure> {
         let mut text = String::new();
         describe_interfaces(&interfaces, &mut text);
         text += "nothing was sent, and no drive was asked\n";
-        folder.finish_step(false, &json!({ "interfaces": interfaces })).incomplete()?;
+        folder.finish_step(false, &serde_json::json!({ "interfaces": interfaces })).incomplete()?;
         result_with_tones(&text, &TONES).usage()?;
         return Ok(Exit::Failed);
     }

@@ -5,16 +5,13 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::{io::Read, thread, time::Duration};
 
 use anyhow::anyhow;
-use clap::Args;
 use masseter_model::geometry::AXIS_NAMES;
 use masseter_plant::commissioning::{JogOrder, JogReport, SyncAnswers, Wish, jog as play};
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_terminal::{Exit, Failure, OrFailure, result_line, status};
-use serde::Serialize;
 
 use super::args::{RobotArgs, parse_axis, parse_length, parse_speed};
 use super::{robot_line::failed, session::Session, step::Step};
-use crate::cli::arguments::parse_duration;
 
 /// For how long a byte permits motion: longer than the time between two repeats of a key, ns.
 const HELD_NS: u64 = 300 * MILLISECOND_NS;
@@ -28,7 +25,7 @@ const DEVIATION: f64 = 0.02;
 const LEAST_PROOF_M: f64 = 5e-4;
 
 /// The arguments of `robot jog`.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "\
 Examples:
   masseter robot jog --axis l1 --by 1mm
@@ -50,7 +47,7 @@ pub(crate) struct JogArgs {
     #[arg(long, value_name = "PERCENT", value_parser = clap::value_parser!(u8).range(1..=100))]
     torque: Option<u8>,
     /// How long the axis stays at the far end, such as 10s to read a gauge
-    #[arg(long, value_name = "TIME", value_parser = parse_duration)]
+    #[arg(long, value_name = "TIME", value_parser = crate::cli::arguments::parse_duration)]
     dwell: Option<Duration>,
     /// What a gauge showed at the far end; the sign is that of d and l
     #[arg(long, value_name = "LENGTH", value_parser = parse_length, allow_hyphen_values = true)]
@@ -171,7 +168,7 @@ fn report_text(axis: usize, report: &JogReport) -> String {
 }
 
 /// What is kept of a jog.
-#[derive(Debug, Serialize)]
+#[derive(Debug, serde::Serialize)]
 struct JogResult {
     by_m: f64,
     moved_m: f64,

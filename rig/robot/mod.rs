@@ -20,13 +20,12 @@ mod status;
 mod step;
 mod watchdog;
 
-use clap::Subcommand;
 use masseter_terminal::{Exit, Failure, OrFailure};
 
 pub(crate) use permission::Played;
 
 /// Verbs of `robot`.
-#[derive(Debug, Clone, Subcommand)]
+#[derive(Debug, Clone, clap::Subcommand)]
 pub(crate) enum RobotVerb {
     /// Read all drives, and show what is not as the scenario needs it
     Inspect(inspect::InspectArgs),

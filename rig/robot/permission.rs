@@ -2,13 +2,11 @@
 //! profiles, and at full speed only after a passed dry run. `masseter run --dry` leaves its evidence beside the steps of the
 //! bring-up.
 
-use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
 use masseter_plant::commissioning::{Identity, Known, Line, NOT_ASKED};
 use masseter_scenario::{FileConfig, Scenario, input::read_bytes};
-use masseter_terminal::status;
 use serde::{Deserialize, Serialize};
 use sha1::{Digest, Sha1};
 
@@ -80,7 +78,7 @@ impl Played<'_> {
         }
         warn_of_interfaces(&scenario.can);
         if self.is_waived {
-            status!(
+            masseter_terminal::status!(
                 "WITHOUT BRING-UP: signs, scales and zeros are not proved, and a wrong one can drive an axis into its end"
             );
             return Ok(());
@@ -102,7 +100,7 @@ impl Played<'_> {
         if !scenario.dry.is_on {
             check_motion(&past, self).context(refused)?;
         }
-        let mut line = Line::open(scenario, Box::new(io::sink()))?;
+        let mut line = Line::open(scenario, Box::new(std::io::sink()))?;
         let drives = Identity::read_all(&mut line, &scenario.can).context(refused)?.map(Known::Is);
         require(&Basis { drives, ..unknown }).context(refused)?;
         warn_of_gaps(&drives);

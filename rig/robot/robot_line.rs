@@ -2,20 +2,17 @@
 
 use std::io::Write;
 
-use anyhow::ensure;
-use masseter_can::canopen::NodeId;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{
     BootUps, Deviation, Known, Line, Outcome, PowerError, Settings, Survey, deviations, gaps,
     judge_interfaces, prove_no_power, take_over,
 };
 use masseter_plant::wanted::WantedDrive;
-use masseter_runtime::clock::MILLISECOND_NS;
 use masseter_scenario::{CanConfig, Scenario};
 use masseter_terminal::{Exit, Failure, status};
 
 /// How long a step listens before its first question, ns: drives boot at power-on, and another master shows.
-pub(super) const LISTEN_NS: u64 = 500 * MILLISECOND_NS;
+pub(super) const LISTEN_NS: u64 = 500 * masseter_runtime::clock::MILLISECOND_NS;
 
 /// Columns of the table of deviations.
 const HEAD: [&str; 6] = ["axis", "object", "wanted", "found", "configure", "decided by"];
@@ -67,7 +64,7 @@ impl RobotLine {
     /// When the bus or the log fails, or the drive does not answer.
     pub(crate) fn whole_survey(&mut self, axis: usize, settings: &Settings) -> anyhow::Result<Survey> {
         let survey = Survey::of_drive(&mut self.line, axis, settings.addresses())?;
-        ensure!(!survey.fell_silent(), "{}: {}", AXIS_NAMES[axis], self.silence(axis));
+        anyhow::ensure!(!survey.fell_silent(), "{}: {}", AXIS_NAMES[axis], self.silence(axis));
         Ok(survey)
     }
 
@@ -89,7 +86,7 @@ impl RobotLine {
 /// # Errors
 /// When a value is not one that a profile allows.
 pub(super) fn wanted_drive(scenario: &Scenario, axis: usize) -> anyhow::Result<WantedDrive> {
-    let node = NodeId::new(scenario.can.node_ids[axis])?;
+    let node = masseter_can::canopen::NodeId::new(scenario.can.node_ids[axis])?;
     Ok(WantedDrive::of_axis(scenario, axis, node)?)
 }
 

@@ -7,7 +7,6 @@ use masseter_plant::commissioning::{
     check_present, check_undisturbed,
 };
 use masseter_runtime::lifecycle::StopRequest;
-use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -22,7 +21,7 @@ const ALL: [usize; AXES] = [0, 1, 2, 3, 4, 5];
 
 /// A step under way.
 pub(super) struct Session {
-    pub(super) scenario: Scenario,
+    pub(super) scenario: masseter_scenario::Scenario,
     pub(super) line: Line,
     pub(super) stop: StopRequest,
     pub(super) past: Past,

@@ -2,16 +2,14 @@
 
 use std::fmt::Write;
 
-use clap::Args;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{Identity, Known};
 use masseter_terminal::{Exit, Tone, result, result_with_tones};
 
 use super::{args::RobotArgs, basis::Basis, evidence::Past, step::Step};
-use crate::BUILD;
 
 /// The arguments of `robot status` and `robot report`.
-#[derive(Debug, Clone, Args)]
+#[derive(Debug, Clone, clap::Args)]
 #[command(after_help = "Example:\n  masseter robot status robot.toml")]
 pub(crate) struct StatusArgs {
     #[command(flatten)]
@@ -49,7 +47,7 @@ pub(crate) fn report(args: &StatusArgs) -> anyhow::Result<Exit> {
         let (Ok(more) | Err(more)) = state;
         writeln!(text, "| {step} | {}{more} |", if state.is_ok() { "passed " } else { "" })?;
     }
-    writeln!(text, "\nBuild: {BUILD}\n\n| axis | drive |\n| --- | --- |")?;
+    writeln!(text, "\nBuild: {}\n\n| axis | drive |\n| --- | --- |", crate::BUILD)?;
     for (name, drive) in AXIS_NAMES.iter().zip(basis.drives) {
         writeln!(text, "| {name} | {} |", drive.identity().map_or_else(String::new, Identity::to_string))?;
     }

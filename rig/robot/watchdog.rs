@@ -3,13 +3,11 @@
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{LastFrame, Reaction, WatchdogReport, Wish, prove_watchdogs};
 use masseter_terminal::{Exit, Failure, OrFailure, result_line};
-use serde::Serialize;
-use serde_json::json;
 
 use super::{args::AxesArgs, session::Session, step::Step};
 
 /// What is kept of one axis.
-#[derive(Debug, Serialize)]
+#[derive(Debug, serde::Serialize)]
 struct AxisResult {
     axis: &'static str,
     #[serde(flatten)]
@@ -31,7 +29,7 @@ pub(crate) fn watchdog(args: &AxesArgs) -> Result<Exit, Failure> {
         };
         print(axis, &report).incomplete()?;
         results.push(AxisResult { axis: AXIS_NAMES[axis], report });
-        session.results = Some(json!(results));
+        session.results = Some(serde_json::json!(results));
     }
     if let Err(disturbance) = session.check_present() {
         return Err(session.fail(Exit::Failed, disturbance));

@@ -1,7 +1,5 @@
 //! A bite, and the probe before the first one, as their force shows them: phases, desired force and damping.
 
-use std::f64::consts::PI;
-
 use masseter_runtime::messages::codes::{Cause, ControllerState};
 use masseter_scenario::{BiteProfile, ForceControlConfig, ForceSource, Scenario};
 
@@ -228,7 +226,7 @@ impl Bite {
 pub(super) fn desired_n(config: &ForceControlConfig, time_s: f64) -> f64 {
     let share = time_s / config.bite_s;
     let raised = match config.profile {
-        BiteProfile::HalfSine => (PI * share).sin(),
+        BiteProfile::HalfSine => (std::f64::consts::PI * share).sin(),
         BiteProfile::Hold => (share / RAMP_SHARE).min(1.0),
     };
     config.contact_n + (config.peak_n - config.contact_n) * raised

@@ -4,8 +4,6 @@
 //! frequencies at which the loop can shake. The doubt in a change of force is taken off; an error beyond the doubt shows as
 //! stiffness, and the bite is slower. This module changes no damping and knows no food.
 
-use masseter_scenario::ForceControlConfig;
-
 /// Least change of height that shows a stiffness, m: more than encoders and drives deviate.
 const LEAST_M: f64 = 4e-6;
 /// Margin of the damping for the part of a change of force that its doubt hides.
@@ -90,7 +88,7 @@ impl ShownStiffness {
 
     /// The damping that this stiffness needs, N per m/s.
     pub(super) fn least_damping_n_s_per_m(&self) -> f64 {
-        MARGIN * ForceControlConfig::least_damping_n_s_per_m(self.n_per_m, self.delay_s)
+        MARGIN * masseter_scenario::ForceControlConfig::least_damping_n_s_per_m(self.n_per_m, self.delay_s)
     }
 }
 

@@ -26,8 +26,6 @@
 //! The proof holds for the input as an exact set of numbers, not for the errors of the encoders. The proof does not
 //! identify the solution.
 
-use std::f64::consts::PI;
-
 use masseter_model::geometry::LEGS;
 
 use super::legs::each;
@@ -77,7 +75,7 @@ impl Certificate {
         Some(Self {
             exists_within_rad: 2.0 * offset_rad / reach * OUTWARD,
             // Beyond half a turn the ball overlaps itself on the torus.
-            unique_within_rad: (reach / curvature / OUTWARD).min(PI),
+            unique_within_rad: (reach / curvature / OUTWARD).min(std::f64::consts::PI),
             regular_within_rad: margin / curvature / OUTWARD,
         })
     }

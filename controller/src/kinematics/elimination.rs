@@ -26,8 +26,6 @@
 //! Next to a singularity two solutions lie close together. [`solutions`](super::solutions) looks for the second
 //! from the first. If rounding does not separate the two, both are reported without a certificate.
 
-use masseter_model::geometry::LEGS;
-
 use super::bernstein::{Interval, NODES, Vanishing, Zeros, locate};
 use super::legs::LegAngle;
 use super::loop_equations::{LoopEquations, LoopSolution, PlatformSide};
@@ -197,7 +195,7 @@ impl<'a> Elimination<'a> {
     }
 
     /// The four sets of leg angles at x with the best fit of sides 12 and 31.
-    pub(super) fn leg_angles(&self, x: f64) -> [[LegAngle; LEGS]; PAIRS] {
+    pub(super) fn leg_angles(&self, x: f64) -> [[LegAngle; masseter_model::geometry::LEGS]; PAIRS] {
         let (driving, second, third) = self.branches(x);
         std::array::from_fn(|pair| [driving, second.leg_angles[pair & 1], third.leg_angles[pair >> 1]])
     }

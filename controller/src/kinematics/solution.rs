@@ -8,7 +8,6 @@
 //! 23,000 has two solutions (`docs/uniqueness.md`). This module does not rely on a single solution.
 
 use masseter_model::geometry::{AXIS_NAMES, Actuators, LEGS, Legs, Mechanism, Pose, Vec3, frame_of_corners};
-use nalgebra::Vector3;
 
 use super::certificate::Certificate;
 use super::equations::{Equations, directions};
@@ -55,7 +54,7 @@ impl Assembly {
     /// Judges leg angles in radians.
     pub fn new(mechanism: &Mechanism, actuators: &Actuators, theta_rad: &[f64; LEGS]) -> Self {
         let equations = Equations::new(mechanism, actuators);
-        let at = equations.evaluate(Vector3::from(*theta_rad));
+        let at = equations.evaluate(nalgebra::Vector3::from(*theta_rad));
         let hinges = std::array::from_fn(|leg| mechanism.hinge(leg, actuators.slide_m[leg]));
         Self::from_corners(mechanism, &hinges, &at.corners, equations.determinant(&at))
     }

@@ -14,7 +14,6 @@ use masseter_model::geometry::{Actuators, LEGS, Mechanism};
 use nalgebra::{Matrix3, Vector3};
 
 use super::equations::{Equations, Evaluation};
-use super::legs::LegAngle;
 use super::loop_equations::{LoopEquations, LoopSolution};
 use super::solution::{ForwardError, Solution};
 
@@ -153,7 +152,7 @@ pub fn solve_traced(
         observe(&at);
     }
     let loops = LoopEquations::new(mechanism, actuators);
-    let leg_angles = std::array::from_fn(|leg| LegAngle::from_rad(at.evaluation.theta_rad[leg]));
+    let leg_angles = std::array::from_fn(|leg| super::legs::LegAngle::from_rad(at.evaluation.theta_rad[leg]));
     let closed = LoopSolution { leg_angles, residuals: loops.evaluate(&leg_angles), iterations: at.number };
     Ok(Solution { residual_m: at.evaluation.residual_norm_m(), ..Solution::new(&loops, &closed) })
 }

@@ -11,7 +11,6 @@ use masseter_model::geometry::{
 use masseter_scenario::TrajectoryLimitsConfig;
 
 use super::{TrajectoryError, motion::Trajectory};
-use crate::kinematics::Assembly;
 
 /// The demands of a trajectory on the axes, in the order d₁ d₂ d₃ l₁ l₂ l₃.
 #[derive(Debug, Clone, PartialEq)]
@@ -121,7 +120,7 @@ impl Survey<'_> {
                  (jaw.closed_offset_m, jaw.closed_leg_m)"
             )
         })?;
-        if let Some(violated) = Assembly::at_pose(self.mechanism, pose, &legs).violated() {
+        if let Some(violated) = crate::kinematics::Assembly::at_pose(self.mechanism, pose, &legs).violated() {
             return Err(format!("{violated}; make the motion smaller"));
         }
         self.check_condition(&Jacobian::of_legs(self.mechanism, &legs))?;

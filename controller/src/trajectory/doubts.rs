@@ -1,7 +1,6 @@
 //! Warnings about a recording that may not be the motion of a jaw. The user decides.
 
 use masseter_model::geometry::Vec3;
-use serde::Serialize;
 
 use super::row::Sample;
 
@@ -91,7 +90,7 @@ pub(super) fn jumps(glitches: &[Glitch]) -> Option<String> {
 /// A glitch is a row off the straight way between its neighbours, with a faster step than usual before or after the
 /// row. The deviation is above 1 mm and above four times the usual deviation of the rows around. A jaw that stops at
 /// the teeth stops hard, but is no faster before. The search ignores jumps of the orientation alone.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
 pub struct Glitch {
     /// Line of the file.
     pub line: u64,

@@ -3,7 +3,6 @@
 //! Rows without a pose count too. What the values mean is not part of this module.
 
 use masseter_scenario::input::{excerpt, sentence};
-use masseter_scenario::wording::counted;
 
 use super::row::{Located, Row, is_lost};
 
@@ -49,7 +48,7 @@ impl Extras {
         let mut protocol = Vec::new();
         if !kept.is_empty() {
             check_order(rows)?;
-            let columns = counted(kept.len() as u64, "column");
+            let columns = masseter_scenario::wording::counted(kept.len() as u64, "column");
             protocol.push(format!("signals from {columns}: {}", sentence(&kept.join(", "))));
         }
         if !unused.is_empty() {

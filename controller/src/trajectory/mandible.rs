@@ -14,7 +14,6 @@ use masseter_scenario::{JawConfig, JawSide};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
 use super::{TrajectoryError, ranges_of, require};
-use crate::kinematics::solve_completely;
 
 /// Largest error of a reached amplitude, mm.
 const REACHED_MM: f64 = 1e-6;
@@ -225,7 +224,7 @@ pub fn closed_pose(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Pose, Traje
     let JawConfig { closed_leg_m, closed_offset_m, .. } = *jaw;
     jaw.check_ranges(ranges_of("jaw"))?;
     let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [closed_leg_m; LEGS] };
-    let closed = solve_completely(mechanism, &actuators).map_err(|error| {
+    let closed = crate::kinematics::solve_completely(mechanism, &actuators).map_err(|error| {
         TrajectoryError(format!("jaw.closed_leg_m = {closed_leg_m:?} m gives no closed pose: {error}"))
     })?;
     Ok(Translation3::from(closed_offset_m) * closed.pose)

@@ -3,7 +3,6 @@
 //! A marker that is lost in a row has no coordinates there (NaN). Three markers that are seen are enough.
 
 use masseter_model::geometry::{Pose, Vec3};
-use masseter_scenario::wording::listed;
 use nalgebra::{Matrix3, Rotation3, Translation3, UnitQuaternion};
 
 use super::layout::MARKERS;
@@ -89,7 +88,7 @@ impl Body {
                 format!(
                     "{} is loose, or not on the lower jaw; leave it out by motion.markers = [{}]",
                     names[loose],
-                    listed(kept.map(|name| format!("\"{name}\"")))
+                    masseter_scenario::wording::listed(kept.map(|name| format!("\"{name}\"")))
                 )
             },
         );

@@ -28,7 +28,6 @@ mod table;
 mod units;
 
 use masseter_model::{geometry::Pose, section};
-use nalgebra::UnitQuaternion;
 
 pub use check::{TrajectoryReport, check};
 pub use doubts::Glitch;
@@ -67,7 +66,7 @@ fn ranges_of(table: &str) -> impl Fn(&str, section::Range, f64) -> Result<(), Tr
 pub(crate) fn interpolate(from: &Pose, to: &Pose, share: f64) -> Pose {
     let turn = from.rotation.rotation_to(&to.rotation).scaled_axis() * share;
     let position = from.translation.vector.lerp(&to.translation.vector, share);
-    Pose::from_parts(position.into(), UnitQuaternion::from_scaled_axis(turn) * from.rotation)
+    Pose::from_parts(position.into(), nalgebra::UnitQuaternion::from_scaled_axis(turn) * from.rotation)
 }
 
 #[cfg(test)]

@@ -4,10 +4,8 @@
 use masseter_model::geometry::{Mechanism, Pose};
 use masseter_scenario::{JawConfig, MotionConfig, Scenario};
 
-use super::doubts::jumps;
 use super::generators::{Chewing, Excursion, minimum_jerk_integral};
 use super::mandible::JawFrame;
-use super::plausible::import;
 use super::recording::Recording;
 use super::{TrajectoryError, interpolate, require};
 
@@ -67,7 +65,7 @@ impl Trajectory {
             MotionConfig::Opening(config) => Motion::Excursion(Excursion::opening(config, jaw)?),
             MotionConfig::Protrusion(config) => Motion::Excursion(Excursion::protrusion(config, jaw)?),
             MotionConfig::Lateral(config) => Motion::Excursion(Excursion::lateral(config, jaw)?),
-            MotionConfig::File(config) => Motion::Recording(import(config, jaw)?),
+            MotionConfig::File(config) => Motion::Recording(super::plausible::import(config, jaw)?),
         };
         let clock = motion.clock(duration_s);
         Ok(Self { motion, clock, frame })
@@ -155,7 +153,7 @@ impl Trajectory {
     /// The doubts about a recording, each with its line; none for a generator.
     pub fn doubts(&self) -> Vec<String> {
         let Some(recording) = self.recording() else { return Vec::new() };
-        recording.doubts.iter().cloned().chain(jumps(&recording.glitches)).collect()
+        recording.doubts.iter().cloned().chain(super::doubts::jumps(&recording.glitches)).collect()
     }
 
     /// File and line, `motion.csv:7`, of the recording nearest to a time of the trajectory; none for a generator.

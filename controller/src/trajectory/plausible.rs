@@ -4,18 +4,14 @@
 //! The likely unit is one in which everything fits. The bounds are wide: they are for wrong units, points and angles,
 //! not for illness. Not found: a wrong unit of a recording that is plausible in several units.
 
-use masseter_model::geometry::Vec3;
 use masseter_scenario::{FileConfig, IfImplausible, JawConfig, LengthUnit, TimeUnit};
-use serde::Serialize;
 
 use super::TrajectoryError;
 use super::doubts::{GLIDE_M, NOTHING_M, TURN_DEG_PER_M, largest, quantile};
 use super::frames::Frames;
 use super::import::Source;
-use super::mandible::jaw_points;
 use super::recording::Recording;
 use super::row::{Located, Sample};
-use super::table::Format;
 use super::units::Unit;
 use Cause::{Length, Time, Turn};
 
@@ -64,7 +60,7 @@ enum Cause {
 }
 
 /// A quantity of a recording that no jaw has.
-#[derive(Debug, Clone, PartialEq, Serialize, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize, thiserror::Error)]
 #[error("line {line}: {quantity}: {} {unit}, plausible is {} {} {unit}; {remedy}", short(*value), if *value < *limit { "at least" } else { "at most" }, short(*limit))]
 pub struct Implausible {
     /// The quantity.
@@ -185,11 +181,11 @@ fn implausible(
     samples: &[Sample],
     jaw: &JawConfig,
 ) -> Result<Vec<Implausible>, TrajectoryError> {
-    let [incisal, right, left] = jaw_points(jaw)?;
+    let [incisal, right, left] = super::mandible::jaw_points(jaw)?;
     let middle = (right + left) / 2.0;
-    let is_of_poses = source.table.format == Format::Poses;
+    let is_of_poses = source.table.format == super::table::Format::Poses;
     let point = if is_of_poses { source.reference } else { incisal };
-    let way_mm = |point: &Vec3| {
+    let way_mm = |point: &masseter_model::geometry::Vec3| {
         largest(&samples.iter().map(|sample| sample.way(point).norm() * 1e3).collect::<Vec<_>>())
     };
     let turns_deg = samples.iter().map(|sample| sample.displacement.rotation.angle().to_degrees());

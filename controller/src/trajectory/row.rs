@@ -2,10 +2,7 @@
 //!
 //! The readings of rows are not part of this module.
 
-use std::path::Path;
-
 use masseter_model::geometry::{Pose, Vec3};
-use masseter_scenario::wording::counted;
 
 use super::TrajectoryError;
 
@@ -59,7 +56,7 @@ impl Located {
         Self { line: None, problem }
     }
 
-    pub(super) fn in_file(self, path: &Path) -> TrajectoryError {
+    pub(super) fn in_file(self, path: &std::path::Path) -> TrajectoryError {
         let line = self.line.map_or_else(String::new, |line| format!(":{line}"));
         TrajectoryError(format!("{}{line}: {}", path.display(), self.problem))
     }
@@ -68,7 +65,7 @@ impl Located {
 /// A line of the protocol for rows without a pose.
 pub(super) fn gaps(lines: &[u64]) -> Option<String> {
     let (first, last) = (lines.first()?, lines.last()?);
-    let rows = counted(lines.len() as u64, "row");
+    let rows = masseter_scenario::wording::counted(lines.len() as u64, "row");
     Some(format!("gaps for lost samples: {rows}, lines {first} to {last}"))
 }
 

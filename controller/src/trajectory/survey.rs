@@ -6,16 +6,10 @@ use masseter_model::geometry::Vec3;
 use masseter_scenario::{FileConfig, JawConfig};
 use serde::Serialize;
 
-use super::TrajectoryError;
-use super::doubts::Glitch;
-use super::frames::Frames;
 use super::import::Source;
-use super::mandible::jaw_points;
 use super::plausible::{Implausible, Judgement};
-use super::recording::Recording;
 use super::row::{Sample, moved};
 use super::table::{Format, Table};
-use super::units::Unit;
 
 /// A step longer than this many usual steps is a gap.
 const GAP_STEPS: f64 = 1.5;
@@ -50,15 +44,15 @@ pub struct RecordingSurvey {
     /// The largest turn from the closed jaw, degrees.
     pub turn_deg: f64,
     /// Rows that leave the path of their neighbours.
-    pub glitches: Vec<Glitch>,
+    pub glitches: Vec<super::Glitch>,
     /// Doubts about the motion of a jaw, each with a line.
     pub doubts: Vec<String>,
     /// What no jaw has: units, points or angles are wrong.
     pub implausible: Vec<Implausible>,
     /// The unit in which the motion is plausible, if the stated ones are not.
-    pub likely_unit: Option<Unit>,
+    pub likely_unit: Option<super::Unit>,
     /// Which of the file's axes point anterior, left and up, in those units; none of a motion without an opening.
-    pub frames: Option<Frames>,
+    pub frames: Option<super::Frames>,
     /// The most likely axes, if the stated ones are not as likely.
     pub likely_axes: Option<[String; 3]>,
     /// The rows in the jaw frame.
@@ -136,12 +130,12 @@ pub struct SurveyRow {
 ///
 /// # Errors
 /// For an unusable file: the line, the reason and a remedy.
-pub fn survey(config: &FileConfig, jaw: &JawConfig) -> Result<RecordingSurvey, TrajectoryError> {
+pub fn survey(config: &FileConfig, jaw: &JawConfig) -> Result<RecordingSurvey, super::TrajectoryError> {
     let source = Source::read(config, jaw)?;
     let samples = source.samples()?;
     let recording = source.recording(&samples)?;
     let Judgement { implausible, likely, frames } = Judgement::new(&source, &samples, config, jaw)?;
-    let points = jaw_points(jaw)?;
+    let points = super::mandible::jaw_points(jaw)?;
     let table = &source.table;
     let row = |sample: &Sample| SurveyRow {
         time_s: sample.time_s - samples[0].time_s,
@@ -238,7 +232,7 @@ fn extent(values: impl Iterator<Item = f64>) -> [f64; 2] {
 fn point_figures(
     path: &[SurveyRow],
     points: &[Vec3; 3],
-    recording: &Recording,
+    recording: &super::recording::Recording,
     point: usize,
 ) -> PointFigures {
     let along_mm = [0, 1, 2].map(|axis| extent(path.iter().map(|row| row.points_m[point][axis] * 1e3)));

@@ -1,13 +1,11 @@
 //! The units of a recording's times, lengths and angles, by their names in files and in a scenario.
 
-use std::f64::consts::PI;
 use std::fmt::{self, Display, Formatter};
 
 use masseter_scenario::{AngleUnit, FileConfig, LengthUnit, TimeUnit};
-use serde::Serialize;
 
 /// A unit of a recording, by its key.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 pub enum Unit {
     /// Of times.
     #[serde(rename = "time_unit")]
@@ -37,7 +35,7 @@ const UNITS: [(Unit, f64, &[&str]); 9] = [
     (Unit::Length(LengthUnit::Mm), 1.0, &["mm", "millimeter", "millimeters", "millimetre", "millimetres"]),
     (Unit::Length(LengthUnit::Cm), 10.0, &["cm", "centimeter", "centimeters", "centimetre", "centimetres"]),
     (Unit::Length(LengthUnit::M), 1000.0, &["m", "meter", "meters", "metre", "metres"]),
-    (Unit::Angle(AngleUnit::Deg), PI / 180.0, &["deg", "degree", "degrees", "°"]),
+    (Unit::Angle(AngleUnit::Deg), std::f64::consts::PI / 180.0, &["deg", "degree", "degrees", "°"]),
     (Unit::Angle(AngleUnit::Rad), 1.0, &["rad", "radian", "radians"]),
 ];
 

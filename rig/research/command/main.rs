@@ -10,7 +10,6 @@ use std::{fs, path::PathBuf, process::ExitCode, sync::Arc};
 use anyhow::Context;
 use clap::{Args, Parser, Subcommand};
 use masseter_plan::{read_scenario_with, set_keys};
-use masseter_recording::new_folder;
 use masseter_research::{Settings, Study};
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, in_one_line, result_line, status};
@@ -82,7 +81,7 @@ struct StudyArgs {
 /// Makes the study.
 fn study(args: &StudyArgs) -> anyhow::Result<Exit> {
     let study = Study::prepare(args.own_scenario()?.as_ref())?;
-    new_folder(&args.out)?;
+    masseter_recording::new_folder(&args.out)?;
     let settings = Settings { seed: args.seed, samples: args.samples as usize, cells: args.cells as usize };
     let mut tables = study.run(settings, |stage| status!("{stage}"))?;
     tables.push(("settings", args.settings_table()));

@@ -1,17 +1,13 @@
 //! Forces in the paper study: friction under load while the jaw chews, controlled bites on three foods, and the
 //! pressure between the jaws. All of them come from runs of the emulated rig under virtual time.
 
-use std::path::Path;
-
 use anyhow::Context;
 use masseter_controller::motion_controller::MotionController;
 use masseter_judge::{Analysis, Band, Bearing, Curve, Figures, PressedTooth, ToothFigures};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plan::RunPlan;
 use masseter_recording::Manifest;
 use masseter_runtime::messages::codes::ControllerState;
 use masseter_scenario::Scenario;
-use masseter_virtual_time::Uninterrupted;
 
 use crate::tables::{csv, number};
 
@@ -122,7 +118,7 @@ fn pressure(bearing: Bearing, load_n: f64) -> [String; 3] {
 
 /// Plays a scenario under virtual time without a recording.
 fn run(scenario: &str) -> anyhow::Result<(Manifest, Figures)> {
-    let plan = RunPlan::new(Scenario::parse(Path::new("study.toml"), scenario)?)?;
+    let plan = masseter_plan::RunPlan::new(Scenario::parse(std::path::Path::new("study.toml"), scenario)?)?;
     let motion_s = plan.trajectory.duration_s();
     let (version, machine) = (env!("CARGO_PKG_VERSION"), masseter_machine::describe());
     let mut manifest = Manifest::new(version, plan.scenario.clone(), motion_s, "virtual", machine);
@@ -131,7 +127,7 @@ fn run(scenario: &str) -> anyhow::Result<(Manifest, Figures)> {
         |scenario, mechanism, motion| Box::new(MotionController::new(scenario, mechanism, motion)),
         Analysis::new,
         &mut manifest,
-        &Uninterrupted,
+        &masseter_virtual_time::Uninterrupted,
     )?;
     Ok((manifest, figures))
 }

@@ -1,13 +1,11 @@
 //! Jaw motions against the mechanism: whether it can follow them, and whether the solvers can.
 
-use masseter_controller::kinematics::ForwardTracker;
 use masseter_controller::trajectory::{Trajectory, TrajectoryReport};
 use masseter_model::geometry::{Actuators, Conditioning, Jacobian, LEGS, Mechanism, Pose};
 use masseter_scenario::{
     ChewingConfig, LateralConfig, MotionConfig, OpeningConfig, ProtrusionConfig, Scenario,
 };
 use rand::RngExt;
-use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
 use crate::maps::COORDINATES;
@@ -109,7 +107,7 @@ impl Motion {
     }
 
     /// The input of any instant.
-    pub(crate) fn input(&self, mechanism: &Mechanism, random: &mut Pcg64Mcg) -> Actuators {
+    pub(crate) fn input(&self, mechanism: &Mechanism, random: &mut rand_pcg::Pcg64Mcg) -> Actuators {
         loop {
             let at_s = random.random_range(0.0..=self.trajectory.duration_s());
             if let Ok(joints) = mechanism.inverse(&self.trajectory.pose(at_s)) {
@@ -127,7 +125,7 @@ fn poses(trajectory: &Trajectory) -> impl Iterator<Item = Pose> {
 
 fn follow(solver: Solver, mechanism: &Mechanism, trajectory: &Trajectory, step_ms: usize) -> Followed {
     let mut last_rad: Option<[f64; LEGS]> = None;
-    let mut tracker = ForwardTracker::new(mechanism.clone());
+    let mut tracker = masseter_controller::kinematics::ForwardTracker::new(mechanism.clone());
     let (mut followed, mut iterations) = (Followed::default(), 0);
     let cycles = (trajectory.duration_s() / CYCLE_S) as usize;
     for cycle in (0..=cycles).step_by(step_ms) {

@@ -8,7 +8,6 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
-use crate::solver::distance_rad;
 use crate::tables::{csv, degrees, number};
 
 /// Angles closer than this are one, radians: two legs' as much as two solutions'.
@@ -79,7 +78,7 @@ impl SolutionSet {
     /// The class of leg angles found by a solver: equal but for the order of the legs. 0 is the true
     /// one's, `None` if no solution above the base has these angles.
     pub(crate) fn class_of(&self, theta_rad: &[f64; LEGS]) -> Option<usize> {
-        let near = |one: &&&Solution| distance_rad(&one.theta_rad, theta_rad) < SAME_RAD;
+        let near = |one: &&&Solution| crate::solver::distance_rad(&one.theta_rad, theta_rad) < SAME_RAD;
         let above = self.above_base();
         let found = above.iter().find(near)?;
         self.classes().iter().position(|class| *class == sorted_microdegrees(&found.theta_rad))

@@ -1,14 +1,10 @@
 //! What the study measures: a table each.
 
-use anyhow::ensure;
 use masseter_model::geometry::{LEGS, Mechanism, MechanismConfig};
-use masseter_scenario::Scenario;
 
 use crate::maps::{SLICES, Slice, basins_table, workspace_table};
-use crate::motions::Motion;
 use crate::solutions::{SolutionSet, multiplicity_table};
 use crate::tables::{csv, number};
-use crate::trials::Trials;
 use crate::{forces, motions, pairs, speed};
 
 /// The extent of a study.
@@ -26,7 +22,7 @@ pub struct Settings {
 #[derive(Debug)]
 pub struct Study {
     mechanism: Mechanism,
-    motions: Vec<Motion>,
+    motions: Vec<crate::motions::Motion>,
 }
 
 impl Study {
@@ -35,9 +31,9 @@ impl Study {
     /// # Errors
     /// When the scenario has another mechanism than the published one, its recording cannot be used, or a value of its
     /// motion lies outside its range.
-    pub fn prepare(scenario: Option<&Scenario>) -> anyhow::Result<Self> {
+    pub fn prepare(scenario: Option<&masseter_scenario::Scenario>) -> anyhow::Result<Self> {
         let published = MechanismConfig::default();
-        ensure!(
+        anyhow::ensure!(
             scenario.is_none_or(|scenario| scenario.mechanism == published),
             "the study is about the published mechanism; leave [mechanism] out of the scenario"
         );
@@ -58,7 +54,7 @@ impl Study {
         let Self { mechanism, motions } = self;
         let Settings { seed, samples, cells } = settings;
         progress(&format!("{samples} random guesses of each kind"));
-        let trials = Trials::run(mechanism, motions, samples, seed);
+        let trials = crate::trials::Trials::run(mechanism, motions, samples, seed);
         let pairs = pairs::disagreements(mechanism, &trials);
         let set = SolutionSet::neutral(mechanism)?;
         let mut tables = vec![

@@ -1,7 +1,5 @@
 //! Tables as CSV, and quantiles of samples.
 
-use serde::Serialize;
-
 /// The value at a quantile between 0 and 1: a member of the sample, or the middle between two; no number for an empty
 /// sample.
 pub(crate) fn quantile(sample: impl IntoIterator<Item = f64>, quantile: f64) -> f64 {
@@ -16,7 +14,7 @@ pub(crate) fn quantile(sample: impl IntoIterator<Item = f64>, quantile: f64) -> 
 ///
 /// # Panics
 /// When a row has not as many columns as the header.
-pub(crate) fn csv(header: &str, rows: impl IntoIterator<Item = impl Serialize>) -> String {
+pub(crate) fn csv(header: &str, rows: impl IntoIterator<Item = impl serde::Serialize>) -> String {
     let mut writer = csv::WriterBuilder::new().has_headers(false).from_writer(Vec::new());
     let mut written = writer.write_record(header.split(','));
     written = written.and_then(|()| rows.into_iter().try_for_each(|row| writer.serialize(row)));

@@ -14,11 +14,9 @@ use std::{borrow::Cow, cell::RefCell, time::Duration};
 
 use masseter_controller::{process, robot_model::RobotModel};
 use masseter_runtime::control::{Outcome, Session, Tick, Waited};
-use masseter_runtime::lifecycle::ProcessContext;
 use masseter_runtime::lifecycle::attach::attach;
 use masseter_runtime::messages::{Command, Event, Reading, State};
 use masseter_runtime::named::{Declared, Parameter, PlayedMotion, Signal};
-use masseter_scenario::Scenario;
 
 use law::{LawFunction, law_of_c};
 
@@ -74,7 +72,7 @@ pub struct MasseterSession {
 
 #[derive(Debug)]
 enum Stage {
-    Attached(Box<ProcessContext>),
+    Attached(Box<masseter_runtime::lifecycle::ProcessContext>),
     Started(Box<Session>),
     /// A start has failed.
     Over,
@@ -103,7 +101,7 @@ impl MasseterSession {
         Ok(c_int::try_from(count).expect("a few are accepted") - 1)
     }
 
-    fn scenario(&self) -> Result<&Scenario, Failure> {
+    fn scenario(&self) -> Result<&masseter_scenario::Scenario, Failure> {
         match &self.stage {
             Stage::Attached(context) => Ok(&context.scenario),
             Stage::Started(session) => Ok(&session.context().scenario),

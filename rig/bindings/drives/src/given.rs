@@ -2,16 +2,14 @@
 //!
 //! The defaults are those of the drives; profiles are the Python part's.
 
-use masseter_can::canopen::NodeId;
 use masseter_drives::{DriveSettings, Identity, Quirk, Ratings};
 use pyo3::prelude::*;
-use serde::Deserialize;
 use serde_json::{Map, Value, json};
 
 use crate::setting_error;
 
 /// The settings of one drive. What is not given keeps its default.
-#[derive(Deserialize)]
+#[derive(serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Given {
     node: i64,
@@ -53,7 +51,7 @@ pub(crate) fn settings_of_all(text: &str) -> PyResult<Vec<DriveSettings>> {
 
 impl Given {
     fn settings(self) -> PyResult<DriveSettings> {
-        let id = u8::try_from(self.node).ok().and_then(|id| NodeId::new(id).ok());
+        let id = u8::try_from(self.node).ok().and_then(|id| masseter_can::canopen::NodeId::new(id).ok());
         let no_id = || setting_error("nodes", self.node, &"no node id of CANopen; use 1 to 127");
         let default = DriveSettings::new(id.ok_or_else(no_id)?);
         let settings = DriveSettings {

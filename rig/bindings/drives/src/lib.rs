@@ -17,7 +17,6 @@ use masseter_can::{
 use masseter_drives::{DriveFault, DriveSettings, Stand, eds};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use serde_json::json;
 
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -325,5 +324,5 @@ impl Inner {
 }
 
 fn fault(kind: &str) -> PyResult<DriveFault> {
-    serde_json::from_value(json!(kind)).map_err(|refusal| setting_error("fault", kind, &refusal))
+    serde_json::from_value(serde_json::json!(kind)).map_err(|refusal| setting_error("fault", kind, &refusal))
 }

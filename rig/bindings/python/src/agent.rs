@@ -10,7 +10,6 @@ use masseter_plan::RunPlan;
 use masseter_runtime::control::{Controller, NoBranch, Outcome, Tick};
 use masseter_runtime::messages::{Command, Event, Reading, State};
 use masseter_runtime::{messages::codes::ControllerState, named::Declared};
-use masseter_scenario::Scenario;
 
 /// The least length of numbers that give a quaternion.
 const LEAST_NORM: f64 = 1e-6;
@@ -34,7 +33,7 @@ impl ActionKind {
     }
 
     /// Refuses a scenario whose drives cannot take such actions.
-    pub(crate) fn check(self, scenario: &Scenario) -> anyhow::Result<()> {
+    pub(crate) fn check(self, scenario: &masseter_scenario::Scenario) -> anyhow::Result<()> {
         let mut feeding = scenario.clone();
         feeding.controller.feed_forward_torque |= self == Self::Forces;
         feeding.validate().context("the action 'forces' feeds forces forward")

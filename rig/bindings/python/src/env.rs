@@ -1,7 +1,5 @@
 //! The environment of Python: one episode after the other on the caller's thread. Numbers cross as the bytes of 64-bit floats.
 
-use std::path::PathBuf;
-
 use bytemuck::cast_slice;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -19,7 +17,7 @@ pub(crate) fn raised(error: anyhow::Error) -> PyErr {
 /// What an environment is made of, as Python gives it.
 #[derive(FromPyObject)]
 pub(crate) struct Arguments {
-    scenario: Option<PathBuf>,
+    scenario: Option<std::path::PathBuf>,
     set: Vec<String>,
     action: String,
     observe: Vec<String>,

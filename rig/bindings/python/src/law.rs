@@ -5,7 +5,6 @@ use std::{sync::mpsc, thread, time::Duration};
 use masseter_controller::pose_law::{
     Demand as RigDemand, ExternalForce as RigExternalForce, FunctionLaw, LawFailed, asked_pose,
 };
-use masseter_controller::process::run_with_law;
 use masseter_model::geometry::{self, AXES};
 use masseter_runtime::named::{Declared, Parameter, PlayedMotion, Signal};
 use masseter_runtime::{control::Outcome, lifecycle::attach::attach, messages::pose_fields};
@@ -220,7 +219,7 @@ pub(crate) fn control(
         prepare.call1(py, (context.scenario.period_s(), context.scenario.parameters.clone()))?;
     }
     let is_simulated = context.lockstep.is_some();
-    let play = move || run_with_law(context, Box::new(law)).map_err(failed);
+    let play = move || masseter_controller::process::run_with_law(context, Box::new(law)).map_err(failed);
     // Debuggers follow the caller's thread. In real time the law has a thread of its own, with which priority and core end.
     let ran = if is_simulated { py.detach(play) } else { in_own_thread(py, play)? };
     if let Ok(exception) = exceptions.try_recv() {

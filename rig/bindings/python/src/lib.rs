@@ -15,12 +15,10 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use bytemuck::{AnyBitPattern, NoUninit, cast_slice, pod_read_unaligned};
-use masseter_controller::kinematics::ForwardTracker;
 use masseter_model::geometry::{self, AXES, Actuators, MechanismConfig};
 use masseter_recording::{ReadError, Reader, RunFolder, Topic};
 use masseter_runtime::lifecycle::attach::AttachError;
 use masseter_runtime::messages::{pose_fields, pose_from_fields};
-use masseter_scenario::Scenario;
 use pyo3::prelude::*;
 use pyo3::{create_exception, exceptions::PyException, types::PyBytes};
 
@@ -76,14 +74,14 @@ impl Mechanism {
     fn new(scenario: Option<PathBuf>) -> PyResult<Self> {
         let config = match scenario {
             None => MechanismConfig::default(),
-            Some(path) => Scenario::read(&path).map_err(failed)?.mechanism,
+            Some(path) => masseter_scenario::Scenario::read(&path).map_err(failed)?.mechanism,
         };
         geometry::Mechanism::new(&config).map(Self).map_err(failed)
     }
 
     /// Poses of rows of six positions.
     fn forward<'py>(&self, py: Python<'py>, positions: &[u8]) -> PyResult<Bound<'py, PyBytes>> {
-        let mut tracker = ForwardTracker::new(self.0.clone());
+        let mut tracker = masseter_controller::kinematics::ForwardTracker::new(self.0.clone());
         solve_rows(py, positions, |axes: [f64; AXES]| {
             let solution = tracker.update(&Actuators::from_axes(axes));
             let pose = solution.map_err(|error| error.to_string())?.pose;

@@ -1,7 +1,5 @@
 //! The robot of a scenario for Python.
 
-use std::path::PathBuf;
-
 use masseter_controller::robot_model::{self, JacobianRows};
 use masseter_model::geometry::{self, AXES};
 use masseter_scenario::Scenario;
@@ -55,7 +53,7 @@ impl RobotModel {
 impl RobotModel {
     #[new]
     #[pyo3(signature = (scenario=None))]
-    fn new(scenario: Option<PathBuf>) -> PyResult<Self> {
+    fn new(scenario: Option<std::path::PathBuf>) -> PyResult<Self> {
         Self::of(
             &scenario
                 .map_or_else(|| Ok(Scenario::default()), |path| Scenario::read(&path))

@@ -3,11 +3,8 @@
 use std::{cell::RefCell, time::Duration};
 
 use masseter_runtime::control::{self, Outcome, Tick, Waited};
-use masseter_runtime::lifecycle::ProcessContext;
 use masseter_runtime::lifecycle::attach::attach;
 use masseter_runtime::messages::{Command, Event, Message, State};
-use masseter_runtime::named::Declared;
-use masseter_scenario::Scenario;
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
 
@@ -21,7 +18,7 @@ pub(crate) struct Session {
 }
 
 enum Stage {
-    Attached(Box<ProcessContext>, Declared),
+    Attached(Box<masseter_runtime::lifecycle::ProcessContext>, masseter_runtime::named::Declared),
     Started(Box<control::Session>),
 }
 
@@ -137,7 +134,7 @@ impl Session {
     }
 
     /// The scenario of the run.
-    fn played(&self) -> PyResult<&Scenario> {
+    fn played(&self) -> PyResult<&masseter_scenario::Scenario> {
         Ok(match self.stage.as_ref().ok_or_else(over)? {
             Stage::Attached(context, _) => &context.scenario,
             Stage::Started(session) => &session.context().scenario,
