@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plan::{read_scenario_with, set_keys};
-use masseter_scenario::Scenario;
+use masseter_scenario::{Dimension, Quantity, Scenario};
 
 use crate::cli::arguments::{Wires, parse_wires};
 
@@ -82,18 +82,18 @@ pub(crate) fn parse_axis(name: &str) -> Result<usize, String> {
 
 /// A length with its unit, such as 1mm, -0.5mm, 20um or 0.001m: metres.
 pub(super) fn parse_length(text: &str) -> Result<f64, String> {
-    let units = [("mm", 1e-3), ("um", 1e-6), ("µm", 1e-6), ("m", 1.0)];
-    let found = units.iter().find_map(|(unit, length_m)| Some((text.strip_suffix(unit)?, length_m)));
-    let length_m = found.and_then(|(number, length_m)| Some(number.trim().parse::<f64>().ok()? * length_m));
-    let finite_m = length_m.filter(|length_m| length_m.is_finite());
-    finite_m.ok_or_else(|| "give a length with its unit, such as 1mm or -0.5mm".to_owned())
+    si_of(text, Dimension::Length)
+        .ok_or_else(|| "give a length with its unit, such as 1mm or -0.5mm".to_owned())
 }
 
 /// A speed with its unit, such as 2mm/s: m/s.
 pub(super) fn parse_speed(text: &str) -> Result<f64, String> {
-    let length_m = text.strip_suffix("/s").and_then(|length| parse_length(length).ok());
-    let speed_m_s = length_m.filter(|speed_m_s| *speed_m_s > 0.0);
+    let speed_m_s = si_of(text, Dimension::Velocity).filter(|speed_m_s| *speed_m_s > 0.0);
     speed_m_s.ok_or_else(|| "give a speed above 0 with its unit, such as 2mm/s".to_owned())
+}
+
+fn si_of(text: &str, dimension: Dimension) -> Option<f64> {
+    text.parse::<Quantity>().ok()?.si_of(dimension).ok()
 }
 
 #[cfg(test)]
