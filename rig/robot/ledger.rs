@@ -4,7 +4,7 @@
 //! Other programs and people may have changed such a file: what is read is checked before anything is sent.
 
 use std::fs::{self, File};
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, ensure};
@@ -12,6 +12,7 @@ use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_plant::commissioning::{
     Identity, Ledger, Line, LineError, OldValue, Settings, give_back, object_name, value_text,
 };
+use masseter_recording::write_whole;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use masseter_scenario::{CanConfig, ObjectKey, Scenario};
 use masseter_terminal::{Failure, status};
@@ -182,12 +183,7 @@ impl Ledger for OwedFiles {
             return Ok(());
         }
         let owed = Owed { drive: self.drives[axis], values: values.to_vec() };
-        let unfinished = path.with_extension("part");
-        let mut part = File::create(&unfinished)?;
-        part.write_all(serde_json::to_string_pretty(&owed)?.as_bytes())?;
-        part.sync_all()?;
-        fs::rename(unfinished, path)?;
-        File::open(&self.folder)?.sync_all()
+        write_whole(&path, &serde_json::to_string_pretty(&owed)?)
     }
 }
 

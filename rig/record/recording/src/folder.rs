@@ -141,21 +141,9 @@ impl RunFolder {
         found.map(|file| Self::of_recording(&file)).ok_or(FolderError::NoFolder(recording))
     }
 
-    /// Writes one of its files completely or not at all, so that a power cut leaves the scenario and the manifest of a
-    /// recording.
+    /// Writes one of its files by [`write_whole`], so that a power cut leaves the scenario and the manifest of a recording.
     pub fn keep(&self, path: &Path, content: &(impl AsRef<[u8]> + ?Sized)) -> io::Result<()> {
-        let unfinished = path.with_extension("part");
-        let write = || {
-            let mut file = File::create(&unfinished)?;
-            file.write_all(content.as_ref())?;
-            file.sync_all()?;
-            fs::rename(&unfinished, path)
-        };
-        write().inspect_err(|_| {
-            let _ = fs::remove_file(&unfinished);
-        })?;
-        secure_names(&self.0);
-        Ok(())
+        write_whole(path, content)
     }
 
     /// The folder itself.
@@ -187,6 +175,22 @@ impl RunFolder {
     pub fn file(&self, name: &str) -> PathBuf {
         self.0.join(name)
     }
+}
+
+/// Writes a file completely or not at all, also when the power is cut.
+pub fn write_whole(path: &Path, content: &(impl AsRef<[u8]> + ?Sized)) -> io::Result<()> {
+    let unfinished = path.with_extension("part");
+    let write = || {
+        let mut file = File::create(&unfinished)?;
+        file.write_all(content.as_ref())?;
+        file.sync_all()?;
+        fs::rename(&unfinished, path)
+    };
+    write().inspect_err(|_| {
+        let _ = fs::remove_file(&unfinished);
+    })?;
+    path.parent().map(secure_names);
+    Ok(())
 }
 
 /// Makes the names in a folder survive a power cut, on file systems that support it.

@@ -27,7 +27,9 @@ mod writer;
 pub use backlog::{Backlog, Pace, WriteOutcome};
 pub use columns::{Columns, Description, Field, Number};
 pub use encoding::{Channel, Encoded, Encoder, SCHEMA_ENCODING, definitions};
-pub use folder::{FolderError, OutputError, RunFolder, new_file, new_folder, recording_at, time_in_names};
+pub use folder::{
+    FolderError, OutputError, RunFolder, new_file, new_folder, recording_at, time_in_names, write_whole,
+};
 pub use manifest::{
     DmaLatency, Ending, FullSpeed, LoopInterval, Machine as MachineInfo, Manifest, ProcessFault, RunUsage,
     Usage,
