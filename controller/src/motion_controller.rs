@@ -110,7 +110,7 @@ impl MotionController {
         if !self.sequencer.is_moving() {
             return Ok(());
         }
-        let demand = self.demand(desired);
+        let demand = self.demand(self.sequencer.cycle, &self.progress.playback, desired);
         if let Some(estimated) = &demand.estimated {
             self.supervise(&desired, estimated)?;
         }
@@ -172,14 +172,10 @@ impl MotionController {
         progress.advance(&self.sequencer, cycle);
         let desired = progress.playback.pose_ahead(-self.sequencer.sample_age_in(cycle));
         let desired_twist = Some(self.desired_twist(cycle, &progress.playback));
-        Demand { desired_twist, ..self.demand_in(cycle, &progress.playback, desired) }
+        Demand { desired_twist, ..self.demand(cycle, &progress.playback, desired) }
     }
 
-    fn demand(&self, desired: Pose) -> Demand {
-        self.demand_in(self.sequencer.cycle, &self.progress.playback, desired)
-    }
-
-    fn demand_in(&self, cycle: u64, playback: &Playback, desired: Pose) -> Demand {
+    fn demand(&self, cycle: u64, playback: &Playback, desired: Pose) -> Demand {
         let Sequencer { period_s, state, config, .. } = &self.sequencer;
         let age_s = self.sequencer.sample_age_in(cycle);
         let fresh = self.sequencer.fresh_estimate();

@@ -266,7 +266,6 @@ fn the_whole_change_takes_its_time_and_ends_exactly() {
 fn a_motion_that_uses_its_limits_changes_slowly() {
     let limits = TrajectoryLimitsConfig::default();
     let demands = |velocity_m_s: f64, acceleration_m_s2: f64| TrajectoryReport {
-        samples: 2,
         lowest_m: [0.0; AXES],
         highest_m: [0.02; AXES],
         velocity_m_s: [velocity_m_s; AXES],

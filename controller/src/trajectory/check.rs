@@ -15,8 +15,6 @@ use super::{TrajectoryError, motion::Trajectory};
 /// The demands of a trajectory on the axes, in the order d₁ d₂ d₃ l₁ l₂ l₃.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrajectoryReport {
-    /// Samples taken.
-    pub samples: usize,
     /// Lowest position, metres.
     pub lowest_m: [f64; AXES],
     /// Highest position, metres.
@@ -62,7 +60,6 @@ pub fn check(
 ) -> Result<TrajectoryReport, TrajectoryError> {
     let samples = (trajectory.duration_s() / period_s).ceil() as usize + 1;
     let report = TrajectoryReport {
-        samples: 0,
         lowest_m: [f64::INFINITY; AXES],
         highest_m: [f64::NEG_INFINITY; AXES],
         velocity_m_s: [0.0; AXES],
@@ -95,7 +92,6 @@ struct Survey<'a> {
 impl Survey<'_> {
     fn visit(&mut self, pose: &Pose) -> Result<(), String> {
         let axes_m = self.visit_pose(pose)?;
-        self.report.samples += 1;
         let Some(last_m) = self.last_m.replace(axes_m) else { return Ok(()) };
         let velocity_m_s = self.rates(&last_m, &axes_m);
         let limit = |axis| self.limits.velocity_m_s(axis);

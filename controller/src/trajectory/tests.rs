@@ -105,7 +105,6 @@ fn a_motion_whose_duration_holds_no_whole_cycle_is_known_to_be_cut() {
 fn every_generator_passes_the_check_with_its_defaults() {
     for motion in generators() {
         let report = judge(&build(&motion, None)).unwrap_or_else(|error| panic!("{motion:?}: {error}"));
-        assert_eq!(report.samples, 10_001);
         assert!(report.margin_m(mechanism().strokes()).iter().all(|&margin_m| margin_m > 0.0));
     }
 }
