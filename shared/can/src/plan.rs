@@ -222,13 +222,13 @@ fn response_ns(messages: &[PlannedMessage], index: usize, bit_ns: u64) -> Option
     }
     let blocking_ns = messages[index + 1..].iter().map(|other| other.transmission_ns).max().unwrap_or(0);
     let own_jitter_ns = own.jitter_ns?;
-    let busy_ns = least_fixed_point(own.transmission_ns, |busy_ns| {
+    let busy_ns = least_fixed_point(own.transmission_ns, LONGEST_BUSY_NS, |busy_ns| {
         Some(blocking_ns + interference_ns(busy_ns, &messages[..=index])?)
     })?;
     let instances = (busy_ns + own_jitter_ns).div_ceil(own.message.period_ns);
     (0..instances).try_fold(0, |longest_ns, instance| {
         let before_ns = blocking_ns + instance * own.transmission_ns;
-        let queued_ns = least_fixed_point(before_ns, |queued_ns| {
+        let queued_ns = least_fixed_point(before_ns, LONGEST_BUSY_NS, |queued_ns| {
             Some(before_ns + interference_ns(queued_ns + bit_ns, more_urgent)?)
         })?;
         let response_ns = (queued_ns + own.transmission_ns).saturating_sub(instance * own.message.period_ns);
@@ -245,15 +245,19 @@ fn interference_ns(window_ns: u64, of: &[PlannedMessage]) -> Option<u64> {
     of.iter().map(taken_ns).sum()
 }
 
-/// The least fixed point of a growing function from `start_ns` on; `None` beyond the longest busy period.
-fn least_fixed_point(start_ns: u64, grow: impl Fn(u64) -> Option<u64>) -> Option<u64> {
-    let mut at_ns = start_ns;
-    while at_ns <= LONGEST_BUSY_NS {
-        let next_ns = grow(at_ns)?;
-        if next_ns <= at_ns {
-            return Some(at_ns);
+/// The least fixed point of a growing function from `start` on; `None` beyond `last`, or where the function has no value.
+pub(crate) fn least_fixed_point<T: Copy + PartialOrd>(
+    start: T,
+    last: T,
+    grow: impl Fn(T) -> Option<T>,
+) -> Option<T> {
+    let mut at = start;
+    while at <= last {
+        let next = grow(at)?;
+        if next <= at {
+            return Some(at);
         }
-        at_ns = next_ns;
+        at = next;
     }
     None
 }

@@ -11,6 +11,7 @@
 
 use std::fmt;
 
+use crate::plan::least_fixed_point;
 use crate::{Bitrate, CanId, NoReleaser, Release, wire::worst_case_bits};
 
 /// The order in which a node sends the frames that wait.
@@ -291,19 +292,6 @@ impl Traffic {
             _ => i64::MAX,
         }
     }
-
-    /// The least fixed point of a growing function from `start_ns` on; `None` beyond the longest busy period.
-    fn least_fixed_point(&self, start_ns: i64, grow: impl Fn(i64) -> i64) -> Option<i64> {
-        let mut at_ns = start_ns;
-        while at_ns <= self.longest_ns() {
-            let next_ns = grow(at_ns);
-            if next_ns <= at_ns {
-                return Some(at_ns);
-            }
-            at_ns = next_ns;
-        }
-        None
-    }
 }
 
 impl Level<'_> {
@@ -311,8 +299,8 @@ impl Level<'_> {
         let (cycle_ns, by_ns) = (self.bus.cycle_ns, self.bus.by_ns(self.of)?);
         let own = self.same.iter().find(|(index, _)| *index == self.of)?.1;
         let all = || self.same.iter().chain(&self.others).map(|(_, load)| load);
-        let busy_ns = self.bus.least_fixed_point(1, |busy_ns| {
-            self.blocking_ns + all().map(|load| load.each_ns * load.most_frames(busy_ns)).sum::<i64>()
+        let busy_ns = least_fixed_point(1, self.bus.longest_ns(), |busy_ns| {
+            Some(self.blocking_ns + all().map(|load| load.each_ns * load.most_frames(busy_ns)).sum::<i64>())
         })?;
         // The times `anchor_ns` plus whole steps, up to `last_ns`, whose busy period may last into the cycle 0.
         let grid = move |anchor_ns: i64, step_ns: i64, last_ns: i64| {
@@ -353,14 +341,10 @@ impl Level<'_> {
         }
         let before = self.same.iter().map(|(_, load)| load.each_ns * load.frames(begin_ns, queued_ns));
         let before_ns = self.blocking_ns + before.sum::<i64>() - own.each_ns;
-        let waits_ns = self.bus.least_fixed_point(before_ns, |waits_ns| {
+        let waits_ns = least_fixed_point(before_ns, self.bus.longest_ns(), |waits_ns| {
             let end_ns = begin_ns + waits_ns + self.bus.bit_ns - 1;
-            before_ns
-                + self
-                    .others
-                    .iter()
-                    .map(|(_, load)| load.each_ns * load.frames(begin_ns, end_ns))
-                    .sum::<i64>()
+            let others = self.others.iter().map(|(_, load)| load.each_ns * load.frames(begin_ns, end_ns));
+            Some(before_ns + others.sum::<i64>())
         })?;
         Some(begin_ns + waits_ns + self.bus.streams[self.of].wire_ns)
     }
