@@ -6,6 +6,7 @@
 
 use std::fmt::{self, Write};
 
+use crate::frame::read_hex;
 use crate::tap::{ERROR_FLAG, ErrorReport, ErrorReportError, Tapped};
 use crate::{CanId, Frame, FrameError, Received};
 
@@ -126,7 +127,7 @@ fn read_line(line: &str) -> Result<(&str, Tapped), LineError> {
         Some(_) => return Err(no_frame()),
     };
     let data = read_data(data).ok_or_else(no_frame)?;
-    let number = read_hex(id).ok_or_else(no_frame)?;
+    let number = read_hex(id).and_then(|number| u32::try_from(number).ok()).ok_or_else(no_frame)?;
     if number & ERROR_FLAG != 0 {
         let details = data.try_into().map_err(|_| no_frame())?;
         return Ok((interface, Tapped::Error(ErrorReport::decode(time_ns, number, details)?)));
@@ -148,12 +149,6 @@ fn read_time(text: &str) -> Option<u64> {
     }
     let ns: u64 = format!("{fraction:0<9}").parse().ok()?;
     seconds.parse::<u64>().ok()?.checked_mul(1_000_000_000)?.checked_add(ns)
-}
-
-/// `from_str_radix` alone accepts a sign.
-fn read_hex(digits: &str) -> Option<u32> {
-    let is_number = digits.bytes().all(|digit| digit.is_ascii_hexdigit());
-    is_number.then(|| u32::from_str_radix(digits, 16).ok()).flatten()
 }
 
 fn read_data(digits: &str) -> Option<Vec<u8>> {

@@ -192,6 +192,12 @@ impl fmt::Display for Frame {
     }
 }
 
+/// The number of hexadecimal digits. `from_str_radix` alone accepts a sign.
+pub(crate) fn read_hex(digits: &str) -> Option<u64> {
+    let is_plain = digits.bytes().all(|digit| digit.is_ascii_hexdigit());
+    is_plain.then(|| u64::from_str_radix(digits, 16).ok()).flatten()
+}
+
 impl fmt::Debug for Frame {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "Frame({self})")

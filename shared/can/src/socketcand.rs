@@ -8,7 +8,7 @@
 
 use std::fmt::{self, Write};
 
-use crate::{CanId, Frame, FrameError, Received};
+use crate::{CanId, Frame, FrameError, Received, frame::read_hex};
 
 /// The first message of the server.
 pub const GREETING: &str = "< hi >";
@@ -148,11 +148,8 @@ fn parse_id(text: &str) -> Result<CanId, RequestError> {
     }
 }
 
-/// A number in hexadecimal digits. `from_str_radix` alone accepts a sign.
 fn parse_number(text: &str) -> Result<u64, RequestError> {
-    let is_number = text.chars().all(|digit| digit.is_ascii_hexdigit());
-    let number = is_number.then(|| u64::from_str_radix(text, 16).ok()).flatten();
-    number.ok_or_else(|| RequestError::Number(text.to_owned()))
+    read_hex(text).ok_or_else(|| RequestError::Number(text.to_owned()))
 }
 
 /// Writes a received frame, with its time in whole microseconds.

@@ -9,6 +9,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use super::ObjectAddress;
+use crate::frame::read_hex;
 
 #[cfg(test)]
 mod tests;
@@ -203,14 +204,14 @@ fn is_beside_entries(name: &str) -> bool {
 
 /// The index in the name of an object's section.
 fn index(name: &str) -> Option<u16> {
-    (name.len() == 4).then(|| hexadecimal(name)).flatten()
+    u16::try_from(read_hex(name)?).ok().filter(|_| name.len() == 4)
 }
 
 /// Index and sub-index in the name of an entry's section.
 fn sub_index(name: &str) -> Option<(u16, u8)> {
     let name = name.to_ascii_lowercase();
     let (object, subindex) = name.split_once("sub")?;
-    Some((index(object)?, u8::try_from(hexadecimal(subindex)?).ok()?))
+    Some((index(object)?, u8::try_from(read_hex(subindex)?).ok()?))
 }
 
 /// The index in the name of a section by which a module extends or adds an object.
@@ -218,12 +219,6 @@ fn of_module(name: &str) -> Option<u16> {
     let name = name.to_ascii_lowercase();
     let rest = name.strip_prefix('m')?.trim_start_matches(|digit: char| digit.is_ascii_digit());
     index(rest.strip_prefix("subext").or(rest.strip_prefix("fixed"))?.get(..4)?)
-}
-
-fn hexadecimal(digits: &str) -> Option<u16> {
-    // The parser itself would take a sign.
-    let is_plain = digits.bytes().all(|digit| digit.is_ascii_hexdigit());
-    is_plain.then(|| u16::from_str_radix(digits, 16).ok()).flatten()
 }
 
 /// `ObjectType` of a domain.
