@@ -188,6 +188,18 @@ fn integer(text: &str) -> Option<i128> {
     i128::from_str_radix(number, radix).ok().map(|number| sign * number)
 }
 
+/// The data types with their names and bits; 0 for any number of bits.
+#[rustfmt::skip]
+const TYPES: [(u16, &str, u32); 25] = [
+    (0x01, "BOOLEAN", 8), (0x02, "INTEGER8", 8), (0x03, "INTEGER16", 16), (0x04, "INTEGER32", 32),
+    (0x05, "UNSIGNED8", 8), (0x06, "UNSIGNED16", 16), (0x07, "UNSIGNED32", 32), (0x08, "REAL32", 32),
+    (0x09, "VISIBLE_STRING", 0), (0x0A, "OCTET_STRING", 0), (0x0B, "UNICODE_STRING", 0), (0x0C, "TIME_OF_DAY", 48),
+    (0x0D, "TIME_DIFFERENCE", 48), (0x0F, "DOMAIN", 0), (0x10, "INTEGER24", 24), (0x11, "REAL64", 64),
+    (0x12, "INTEGER40", 40), (0x13, "INTEGER48", 48), (0x14, "INTEGER56", 56), (0x15, "INTEGER64", 64),
+    (0x16, "UNSIGNED24", 24), (0x18, "UNSIGNED40", 40), (0x19, "UNSIGNED48", 48), (0x1A, "UNSIGNED56", 56),
+    (0x1B, "UNSIGNED64", 64),
+];
+
 /// Data type by its index in the object dictionary (CiA 301, table 44).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct DataType(pub u16);
@@ -199,28 +211,22 @@ impl DataType {
     pub const DOMAIN: Self = Self(0xF);
 
     /// Bits of a value; none for a type of any length and for unknown types.
-    pub const fn bits(self) -> Option<u32> {
-        Some(match self.0 {
-            0x1 | 0x2 | 0x5 => 8,
-            0x3 | 0x6 => 16,
-            0x10 | 0x16 => 24,
-            0x4 | 0x7 | 0x8 => 32,
-            0x12 | 0x18 => 40,
-            0x13 | 0x19 | 0xC | 0xD => 48,
-            0x14 | 0x1A => 56,
-            0x11 | 0x15 | 0x1B => 64,
-            _ => return None,
-        })
+    pub fn bits(self) -> Option<u32> {
+        self.named().map(|(_, _, bits)| *bits).filter(|&bits| bits > 0)
     }
 
     /// Whether values are integers that may be negative.
-    pub const fn is_signed(self) -> bool {
-        matches!(self.0, 0x2..=0x4 | 0x10 | 0x12..=0x15)
+    pub fn is_signed(self) -> bool {
+        self.named().is_some_and(|(_, name, _)| name.starts_with("INTEGER"))
     }
 
     /// Whether values are floating-point numbers.
-    pub const fn is_real(self) -> bool {
-        matches!(self.0, 0x8 | 0x11)
+    pub fn is_real(self) -> bool {
+        self.named().is_some_and(|(_, name, _)| name.starts_with("REAL"))
+    }
+
+    fn named(self) -> Option<&'static (u16, &'static str, u32)> {
+        TYPES.iter().find(|(index, ..)| *index == self.0)
     }
 
     /// The integers that the type holds; none for a type of no integers.
@@ -234,21 +240,10 @@ impl DataType {
 /// As CiA 301 names it: `UNSIGNED32`.
 impl Display for DataType {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let name = match self.0 {
-            0x1 => "BOOLEAN",
-            0x9 => "VISIBLE_STRING",
-            0xA => "OCTET_STRING",
-            0xB => "UNICODE_STRING",
-            0xC => "TIME_OF_DAY",
-            0xD => "TIME_DIFFERENCE",
-            0xF => "DOMAIN",
-            _ if self.is_real() => "REAL",
-            _ if self.is_signed() => "INTEGER",
-            _ if self.bits().is_some() => "UNSIGNED",
-            other => return write!(f, "data type {other:04X}h"),
-        };
-        let bits = self.bits().filter(|_| matches!(name, "REAL" | "INTEGER" | "UNSIGNED"));
-        write!(f, "{name}{}", bits.map_or_else(String::new, |bits| bits.to_string()))
+        match self.named() {
+            Some((_, name, _)) => f.write_str(name),
+            None => write!(f, "data type {:04X}h", self.0),
+        }
     }
 }
 
