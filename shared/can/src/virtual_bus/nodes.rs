@@ -282,19 +282,15 @@ impl Nodes {
         })
     }
 
+    /// The most urgent frame of the port at that time: a queued one, or the one that it babbles.
     fn candidate(&self, port: usize, start_ns: u64) -> Option<Candidate> {
         let queued = self.stations[port].transmit.most_urgent(start_ns);
         let queued = queued.map(|&queued| Candidate { port, queued, babbles: None });
-        match self.babbled(port, start_ns) {
-            Some(babbled) if queued.is_none_or(|queued| babbled.id() < queued.id()) => Some(babbled),
-            _ => queued,
-        }
-    }
-
-    fn babbled(&self, port: usize, start_ns: u64) -> Option<Candidate> {
-        let (activation, frame) = self.faults.makes_babble(start_ns, port)?;
-        let queued = Queued::new(frame, self.config.bitrate, start_ns);
-        Some(Candidate { port, queued, babbles: Some(activation) })
+        let babbled = self.faults.makes_babble(start_ns, port).map(|(activation, frame)| {
+            let queued = Queued::new(frame, self.config.bitrate, start_ns);
+            Candidate { port, queued, babbles: Some(activation) }
+        });
+        babbled.filter(|babbled| queued.is_none_or(|queued| babbled.id() < queued.id())).or(queued)
     }
 
     /// Whether a port that does not send the frame receives it.
