@@ -3,7 +3,7 @@
 //! An axis with an encoder that keeps its position is compared and not moved. The others home twice: the second homing
 //! shows the spread.
 
-use masseter_can::cia402::{Controlword, StatusBit};
+use masseter_can::cia402::{ControlBit, Controlword, StatusBit};
 use masseter_runtime::clock::SECOND_NS;
 use masseter_scenario::{HomingConfig, ObjectKey, ObjectRule, Scenario};
 use serde::Serialize;
@@ -148,7 +148,7 @@ fn search(mover: &mut Mover<'_>, stroke_m: f64) -> Result<Found, MotionError> {
     let mut is_old =
         mover.look()?.status.has(StatusBit::HOMING_ATTAINED) && !ON_THE_SPOT.contains(&homing.method);
     let begins_ns = mover.line.now_ns() + SECOND_NS;
-    mover.control(Controlword::ENABLE_OPERATION.with_start())?;
+    mover.control(Controlword::ENABLE_OPERATION.with(ControlBit::Start))?;
     let mut before_m = began_m;
     loop {
         let sample = mover.look()?;

@@ -1,7 +1,7 @@
 //! One axis with power, under watch: prepared, switched on, moved to a position, and stopped in every case.
 
 use masseter_can::canopen::{NmtCommand, ObjectAddress};
-use masseter_can::cia402::{Controlword, StatusBit};
+use masseter_can::cia402::{ControlBit, Controlword, StatusBit};
 use masseter_model::geometry::AXES;
 use masseter_runtime::clock::SECOND_NS;
 use masseter_scenario::{AxisScale, DriveProfile, MASTER_NODE, ObjectKey, ObjectRule, Scenario};
@@ -226,7 +226,7 @@ impl<'a> Mover<'a> {
         self.line.write(self.axis, ObjectAddress::new(0x607A, 0), target as u32, 4)?;
         self.line.control(self.axis, word)?;
         self.wait_for_leave()?;
-        self.line.control(self.axis, word.with_start().with_immediate_change())?;
+        self.line.control(self.axis, word.with(ControlBit::Start).with(ControlBit::ChangeImmediately))?;
         let mut until_ns = self.line.now_ns() + seconds(limit_s);
         let (mut seen, mut is_taken, mut halted_ns) = (vec![], false, None);
         loop {
@@ -238,7 +238,7 @@ impl<'a> Mover<'a> {
             match ((self.operator)(sample.at_ns), halted_ns) {
                 (Wish::Stop, _) => return self.stopped(StopCause::Requested),
                 (Wish::Halt, None) => {
-                    self.line.control(self.axis, word.with_halt())?;
+                    self.line.control(self.axis, word.with(ControlBit::Halt))?;
                     halted_ns = Some(sample.at_ns);
                 }
                 (Wish::Move, Some(since_ns)) => {
@@ -250,7 +250,10 @@ impl<'a> Mover<'a> {
             }
             if !is_taken && sample.status.has(StatusBit::SETPOINT_ACKNOWLEDGED) {
                 is_taken = true;
-                self.line.control(self.axis, if halted_ns.is_some() { word.with_halt() } else { word })?;
+                self.line.control(
+                    self.axis,
+                    if halted_ns.is_some() { word.with(ControlBit::Halt) } else { word },
+                )?;
             }
             let is_there = (sample.position_m - way.target_m).abs() <= still_m;
             if is_taken && is_there && sample.status.has(StatusBit::TargetReached) {

@@ -7,7 +7,7 @@ mod watchdogs;
 use std::path::Path;
 
 use masseter_can::canopen::{NodeId, ObjectAddress};
-use masseter_can::cia402::{Controlword, DriveState};
+use masseter_can::cia402::{ControlBit, Controlword, DriveState};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_scenario::{ObjectKey, Scenario};
@@ -156,7 +156,7 @@ fn a_released_key_halts_and_a_stop_switches_off() {
     assert!(at_ns.last().unwrap() < &(4 * SECOND_NS));
     bench.assert_off();
     let words = bench.log.controlwords();
-    let halts = words.iter().filter(|(_, word)| word.halts()).count();
+    let halts = words.iter().filter(|(_, word)| word.has(ControlBit::Halt)).count();
     assert_eq!(halts, 1, "at the release: {words:?}");
     let end: Vec<_> = words[words.len() - 2..].iter().map(|(_, word)| *word).collect();
     assert_eq!(end, [Controlword::QUICK_STOP, Controlword::DISABLE_VOLTAGE]);
@@ -176,7 +176,7 @@ fn a_stop_while_the_axis_waits_starts_nothing() {
     bench.assert_off();
     let words = bench.log.controlwords();
     assert!(words.iter().any(|(_, word)| *word == Controlword::ENABLE_OPERATION), "it had power: {words:?}");
-    assert!(!words.iter().any(|(_, word)| word.starts()), "{words:?}");
+    assert!(!words.iter().any(|(_, word)| word.has(ControlBit::Start)), "{words:?}");
 }
 
 #[test]

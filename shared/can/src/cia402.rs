@@ -199,16 +199,29 @@ impl Statusword {
     }
 }
 
-const SWITCH_ON: u16 = 1 << 0;
-const ENABLE_VOLTAGE: u16 = 1 << 1;
-/// Low-active: a cleared bit demands a quick stop.
-const NO_QUICK_STOP: u16 = 1 << 2;
-const ENABLE_OPERATION: u16 = 1 << 3;
-const MODE_START: u16 = 1 << 4;
-const CHANGE_IMMEDIATELY: u16 = 1 << 5;
-const RELATIVE: u16 = 1 << 6;
-const FAULT_RESET: u16 = 1 << 7;
-const HALT: u16 = 1 << 8;
+/// A bit of the controlword.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum ControlBit {
+    /// To switched on.
+    SwitchOn = 0,
+    /// Cleared: no voltage.
+    EnableVoltage = 1,
+    /// Low-active: a cleared bit demands a quick stop.
+    NoQuickStop = 2,
+    /// To operation enabled.
+    EnableOperation = 3,
+    /// Profile position: a new set-point. Homing: the operation starts.
+    Start = 4,
+    /// Profile position: the new set-point takes effect before the present motion ends.
+    ChangeImmediately = 5,
+    /// Profile position: the target is relative to the previous target.
+    Relative = 6,
+    /// Its rising edge leaves fault.
+    FaultReset = 7,
+    /// The axis stops.
+    Halt = 8,
+}
 
 /// Object 6040 as it is on the wire.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, serde::Serialize, serde::Deserialize)]
@@ -216,79 +229,48 @@ pub struct Controlword(pub u16);
 
 impl Controlword {
     /// Disable voltage.
-    pub const DISABLE_VOLTAGE: Self = Self(0x0000);
+    pub const DISABLE_VOLTAGE: Self = Self(0);
     /// Quick stop.
-    pub const QUICK_STOP: Self = Self(ENABLE_VOLTAGE);
+    pub const QUICK_STOP: Self = Self::DISABLE_VOLTAGE.with(ControlBit::EnableVoltage);
     /// Shutdown.
-    pub const SHUTDOWN: Self = Self(ENABLE_VOLTAGE | NO_QUICK_STOP);
+    pub const SHUTDOWN: Self = Self::QUICK_STOP.with(ControlBit::NoQuickStop);
     /// Switch on; in operation enabled the same bits disable operation.
-    pub const SWITCH_ON: Self = Self(Self::SHUTDOWN.0 | SWITCH_ON);
+    pub const SWITCH_ON: Self = Self::SHUTDOWN.with(ControlBit::SwitchOn);
     /// Enable operation.
-    pub const ENABLE_OPERATION: Self = Self(Self::SWITCH_ON.0 | ENABLE_OPERATION);
+    pub const ENABLE_OPERATION: Self = Self::SWITCH_ON.with(ControlBit::EnableOperation);
     /// Fault reset; the controlword before must have this bit cleared.
-    pub const FAULT_RESET: Self = Self(FAULT_RESET);
+    pub const FAULT_RESET: Self = Self::DISABLE_VOLTAGE.with(ControlBit::FaultReset);
 
     /// The command to a drive in that state, after the previous controlword.
     ///
     /// Fault reset is the rising edge of bit 7 in the state fault. Any other bit 7 is ignored and leaves the other
     /// bits valid, so that bit 7 can never mask a quick stop.
     pub const fn command(self, previous: Self, state: DriveState) -> StateCommand {
-        let is_edge = self.has(FAULT_RESET) && !previous.has(FAULT_RESET);
+        let is_edge = self.has(ControlBit::FaultReset) && !previous.has(ControlBit::FaultReset);
         if is_edge && matches!(state, DriveState::Fault) {
             StateCommand::FaultReset
-        } else if !self.has(ENABLE_VOLTAGE) {
+        } else if !self.has(ControlBit::EnableVoltage) {
             StateCommand::DisableVoltage
-        } else if !self.has(NO_QUICK_STOP) {
+        } else if !self.has(ControlBit::NoQuickStop) {
             StateCommand::QuickStop
-        } else if !self.has(SWITCH_ON) {
+        } else if !self.has(ControlBit::SwitchOn) {
             StateCommand::Shutdown
-        } else if !self.has(ENABLE_OPERATION) {
+        } else if !self.has(ControlBit::EnableOperation) {
             StateCommand::SwitchOn
         } else {
             StateCommand::EnableOperation
         }
     }
 
-    /// Bit 4: new set-point in profile position, operation start in homing.
-    pub const fn starts(self) -> bool {
-        self.has(MODE_START)
+    /// Whether that bit is set.
+    pub const fn has(self, bit: ControlBit) -> bool {
+        self.0 >> bit as u8 & 1 == 1
     }
 
-    /// Bit 5 in profile position: the new set-point takes effect before the present motion ends.
-    pub const fn changes_immediately(self) -> bool {
-        self.has(CHANGE_IMMEDIATELY)
-    }
-
-    /// Bit 6 in profile position: the target is relative to the previous target.
-    pub const fn is_relative(self) -> bool {
-        self.has(RELATIVE)
-    }
-
-    /// Bit 8: the axis stops.
-    pub const fn halts(self) -> bool {
-        self.has(HALT)
-    }
-
-    /// The controlword with bit 4: a new set-point, or the start of homing.
+    /// The controlword with that bit set.
     #[must_use]
-    pub const fn with_start(self) -> Self {
-        Self(self.0 | MODE_START)
-    }
-
-    /// The controlword with bit 5: a new set-point takes effect at once.
-    #[must_use]
-    pub const fn with_immediate_change(self) -> Self {
-        Self(self.0 | CHANGE_IMMEDIATELY)
-    }
-
-    /// The controlword with bit 8: the axis stops.
-    #[must_use]
-    pub const fn with_halt(self) -> Self {
-        Self(self.0 | HALT)
-    }
-
-    const fn has(self, bit: u16) -> bool {
-        self.0 & bit != 0
+    pub const fn with(self, bit: ControlBit) -> Self {
+        Self(self.0 | 1 << bit as u8)
     }
 }
 
@@ -345,7 +327,7 @@ pub const fn next_controlword(
             DriveState::SwitchedOn | DriveState::OperationEnabled => Controlword::ENABLE_OPERATION,
             DriveState::QuickStopActive => Controlword::QUICK_STOP,
             // A word with the bit set gives no rising edge.
-            DriveState::Fault if !previous.has(FAULT_RESET) => Controlword::FAULT_RESET,
+            DriveState::Fault if !previous.has(ControlBit::FaultReset) => Controlword::FAULT_RESET,
             DriveState::NotReadyToSwitchOn | DriveState::FaultReactionActive | DriveState::Fault => {
                 Controlword::DISABLE_VOLTAGE
             }

@@ -16,7 +16,7 @@ mod servo;
 mod supervision;
 
 use masseter_can::canopen::EmergencyCode;
-use masseter_can::cia402::{Controlword, DriveState, StateCommand, StatusBit, Statusword};
+use masseter_can::cia402::{ControlBit, Controlword, DriveState, StateCommand, StatusBit, Statusword};
 
 use crate::faults::{DriveFault, DriveFaults};
 use crate::{dictionary::Objects, names, quirks::AxisQuirks, ratings::Ratings, settings::DriveSettings};
@@ -135,9 +135,9 @@ impl Axis {
                     let (counts, limits) = (self.coordinates.counts, self.switches.limits);
                     self.homing.control(words, method, counts, limits, view)
                 }
-                Mode::ProfileVelocity | Mode::ProfileTorque => {
-                    (word.halts() && !before.halts()).then_some(MotionCommand::SlowDown)
-                }
+                Mode::ProfileVelocity | Mode::ProfileTorque => (word.has(ControlBit::Halt)
+                    && !before.has(ControlBit::Halt))
+                .then_some(MotionCommand::SlowDown),
                 Mode::CyclicPosition | Mode::CyclicVelocity | Mode::CyclicTorque => None,
             };
             self.execute(command, now_ns);
@@ -217,7 +217,7 @@ impl Axis {
     /// target that runs already goes on.
     pub(super) fn retarget(&mut self, now_ns: u64, objects: &Objects) {
         let is_profile = matches!(self.mode, Mode::ProfileVelocity | Mode::ProfileTorque);
-        if !is_profile || !self.power.is_operated() || self.controlword.halts() {
+        if !is_profile || !self.power.is_operated() || self.controlword.has(ControlBit::Halt) {
             return;
         }
         if self.ignores(NewTargets { velocity: true, torque: true, ..NewTargets::default() }) {
@@ -418,7 +418,8 @@ impl Axis {
             return false;
         }
         let demand_m = self.demand.position_m(now_ns).unwrap_or(self.measured_m());
-        self.controlword.halts() || (demand_m - self.measured_m()).abs() <= self.parameters.position_window_m
+        self.controlword.has(ControlBit::Halt)
+            || (demand_m - self.measured_m()).abs() <= self.parameters.position_window_m
     }
 
     /// Statusword bit 10 of profile velocity and torque: the target is there, or the axis is halted.
@@ -429,7 +430,7 @@ impl Axis {
                 error_m_s.abs() <= self.parameters.velocity_window_m_s
             }
             Demand::Force(ramp) => ramp.at(now_ns).to_bits() == ramp.target.to_bits(),
-            demand => self.controlword.halts() && demand.is_at_rest(now_ns),
+            demand => self.controlword.has(ControlBit::Halt) && demand.is_at_rest(now_ns),
         }
     }
 
@@ -560,7 +561,7 @@ impl Axis {
                     Demand::Profile(Profile::to(from_ns, start, self.coordinates.metres(target), &limits));
             }
             MotionCommand::SlowDown => {
-                let halt_m_s2 = halt_m_s2.filter(|_| self.controlword.halts());
+                let halt_m_s2 = halt_m_s2.filter(|_| self.controlword.has(ControlBit::Halt));
                 self.slow_down(now_ns, halt_m_s2.unwrap_or(limits.deceleration_m_s2));
             }
             MotionCommand::Hold => {

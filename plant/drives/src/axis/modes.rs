@@ -17,7 +17,7 @@
 //! Profile position has set-points with the handshake of controlword bits 4, 5, 6 and 8 and statusword bits 10 and 12. One
 //! set-point runs, one may wait for it. Motion through a set-point without stopping (bit 9) is not supported.
 
-use masseter_can::cia402::{Controlword, StatusBit, Statusword};
+use masseter_can::cia402::{ControlBit, Controlword, StatusBit, Statusword};
 
 use super::encoder::mark_between;
 use super::motion::{MotionCommand, PositionView};
@@ -134,7 +134,7 @@ impl Homing {
         limits: [bool; 2],
         view: PositionView,
     ) -> Option<MotionCommand> {
-        let is_start = |word: Controlword| word.starts() && !word.halts();
+        let is_start = |word: Controlword| word.has(ControlBit::Start) && !word.has(ControlBit::Halt);
         if is_start(word) && !is_start(before) {
             Some(self.start(method, counts, limits, view))
         } else if !is_start(word) && self.is_running() {
@@ -249,12 +249,12 @@ impl Positioning {
         target_position: i32,
         view: PositionView,
     ) -> Option<MotionCommand> {
-        let mut command = match (before.halts(), word.halts()) {
+        let mut command = match (before.has(ControlBit::Halt), word.has(ControlBit::Halt)) {
             (false, true) => Some(MotionCommand::SlowDown),
             (true, false) => self.running.map(|target| MotionCommand::MoveTo { target }),
             _ => None,
         };
-        if word.starts() && !before.starts() {
+        if word.has(ControlBit::Start) && !before.has(ControlBit::Start) {
             command = self.take_setpoint(word, target_position, view).or(command);
         }
         self.end_handshake(word);
@@ -271,12 +271,15 @@ impl Positioning {
     ) -> Option<MotionCommand> {
         // A relative target is added to the set-point before, or to the actual position.
         let base = self.waiting.or(self.running).or(self.reached).unwrap_or(view.actual);
-        let requested =
-            if word.is_relative() { base.saturating_add(target_position) } else { target_position };
+        let requested = if word.has(ControlBit::Relative) {
+            base.saturating_add(target_position)
+        } else {
+            target_position
+        };
         let target = view.clamp(requested);
         let is_free = self.running.is_none() && self.waiting.is_none();
         let mut command = None;
-        if word.changes_immediately() || is_free {
+        if word.has(ControlBit::ChangeImmediately) || is_free {
             self.waiting = None;
             command = self.start(word, target);
         } else if self.waiting.is_none() {
@@ -291,12 +294,12 @@ impl Positioning {
 
     fn start(&mut self, word: Controlword, target: i32) -> Option<MotionCommand> {
         self.running = Some(target);
-        (!word.halts()).then_some(MotionCommand::MoveTo { target })
+        (!word.has(ControlBit::Halt)).then_some(MotionCommand::MoveTo { target })
     }
 
     /// Starts the waiting set-point once the running one is over, as `is_at_rest` reports of the demand.
     pub(super) fn step(&mut self, word: Controlword, is_at_rest: bool) -> Option<MotionCommand> {
-        if word.halts() || !is_at_rest {
+        if word.has(ControlBit::Halt) || !is_at_rest {
             return None;
         }
         if let Some(target) = self.running.take() {
@@ -310,7 +313,7 @@ impl Positioning {
 
     /// Ends the acknowledgement once the master has cleared bit 4 and another set-point has room.
     fn end_handshake(&mut self, word: Controlword) {
-        if !word.starts() && self.waiting.is_none() {
+        if !word.has(ControlBit::Start) && self.waiting.is_none() {
             self.is_acknowledged = false;
         }
     }

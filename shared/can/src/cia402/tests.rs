@@ -141,13 +141,13 @@ fn dont_care_bits_do_not_matter() {
 fn only_the_rising_edge_of_bit_7_resets() {
     for previous in 0..=0xFF {
         let command = Controlword::FAULT_RESET.command(Controlword(previous), DriveState::Fault);
-        assert_eq!(command == StateCommand::FaultReset, previous & FAULT_RESET == 0);
+        assert_eq!(command == StateCommand::FaultReset, previous & Controlword::FAULT_RESET.0 == 0);
     }
 }
 
 #[test]
 fn bit_7_masks_no_stop() {
-    let held = Controlword(Controlword::QUICK_STOP.0 | FAULT_RESET);
+    let held = Controlword(Controlword::QUICK_STOP.0 | Controlword::FAULT_RESET.0);
     assert_eq!(held.command(Controlword::FAULT_RESET, DriveState::Fault), StateCommand::QuickStop);
     let enabled = DriveState::OperationEnabled;
     assert_eq!(held.command(Controlword::ENABLE_OPERATION, enabled), StateCommand::QuickStop);
