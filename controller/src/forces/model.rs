@@ -108,7 +108,7 @@ impl Model {
         let coulomb_n = Vector6::from(self.friction.coulomb_n(loads));
         match bristles {
             Some(shares) => {
-                coulomb_n.component_mul(shares) + motion.rates_m_s * self.friction.viscous_n_s_per_m()
+                coulomb_n.component_mul(shares) + motion.rates_m_s * self.friction.viscous_n_s_per_m
             }
             None => coulomb_n.zip_map(&motion.rates_m_s, |coulomb_n, speed_m_s| {
                 self.friction.drag_n_s_per_m(coulomb_n, speed_m_s) * speed_m_s

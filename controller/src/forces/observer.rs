@@ -165,7 +165,7 @@ impl ForceObserver {
             self.bristles_m.zip_apply(&motion.rates_m_s, |bristles_m, speed_m_s| {
                 *bristles_m = (*bristles_m + period_s * speed_m_s) / friction.slip(speed_m_s, period_s);
             });
-            self.bristles_m / friction.bristle_deflection_m()
+            self.bristles_m / friction.config.bristle_deflection_m
         })
     }
 
@@ -193,7 +193,7 @@ impl ForceObserver {
         let Self { config, model: Model { friction, .. }, step_n, .. } = self;
         let vertical = motion.jacobian.actuators.column(2).abs();
         let losses = Vector6::from_fn(|axis, _| friction.screw_doubt(axis, config.screw_uncertainty));
-        let breakaway = friction.breakaway_ratio() + config.breakaway_uncertainty;
+        let breakaway = friction.config.breakaway_ratio + config.breakaway_uncertainty;
         let calibrated = self.calibration.doubts_n(&braking.loaded(motion), &losses, breakaway);
         let (left_n, bounds_n) = if let Some([left_n, lost_n]) = calibrated {
             (left_n, lost_n)
@@ -207,7 +207,7 @@ impl ForceObserver {
                 (breakaway - 1.0) * coulomb_n.dot(&speeds_m_s.map(|speed_m_s| self.breaking(speed_m_s))),
                 vertical.dot(&braking.screw_n.component_mul(&losses)),
                 share * unloaded_n.sum(),
-                share * friction.viscous_n_s_per_m() * vertical.dot(&speeds_m_s),
+                share * friction.viscous_n_s_per_m * vertical.dot(&speeds_m_s),
                 share * braking.joints[2],
                 config.mass_uncertainty * weight_n,
             ];
@@ -232,7 +232,7 @@ impl ForceObserver {
 
     /// How much an axis of this speed may have breakaway friction, whose speed may be twice the model's, 0 to 1.
     fn breaking(&self, speed_m_s: f64) -> f64 {
-        (-(speed_m_s / (2.0 * self.model.friction.breakaway_speed_m_s())).powi(2)).exp()
+        (-(speed_m_s / (2.0 * self.model.friction.config.breakaway_speed_m_s)).powi(2)).exp()
     }
 }
 

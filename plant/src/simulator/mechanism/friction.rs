@@ -79,7 +79,7 @@ impl Braking {
             * 2.0
             * (stiffness_n_per_m * self.masses_kg[axis]).sqrt()
             * fading;
-        let viscous_n_s_per_m = self.law.viscous_n_s_per_m();
+        let viscous_n_s_per_m = self.law.viscous_n_s_per_m;
         Element {
             force_n: -stiffness_n_per_m * next_m
                 - damping_n_s_per_m * (next_m - z_m) / step_s

@@ -62,9 +62,11 @@ impl Loads {
 /// ```
 #[derive(Debug, Clone, Copy, serde::Serialize, serde::Deserialize)]
 pub struct Friction {
-    config: FrictionConfig,
+    /// The table of the scenario; without friction, guides and joints have none, and screws have no loss.
+    pub config: FrictionConfig,
+    /// Viscous friction of an axis, N per m/s.
+    pub viscous_n_s_per_m: f64,
     unloaded_n: [f64; AXES],
-    viscous_n_s_per_m: f64,
 }
 
 impl Friction {
@@ -111,16 +113,6 @@ impl Friction {
         1.0 / (1.0 / inverse - doubt).max(0.1) - inverse
     }
 
-    /// Breakaway friction divided by Coulomb friction.
-    pub fn breakaway_ratio(&self) -> f64 {
-        self.config.breakaway_ratio
-    }
-
-    /// Speed at which breakaway friction is reached, m/s.
-    pub fn breakaway_speed_m_s(&self) -> f64 {
-        self.config.breakaway_speed_m_s
-    }
-
     /// Friction divided by speed, N per m/s: Stribeck curve and viscous friction,
     /// F = √(2e)(F_s − F_c) exp(−(v/v_S)²) v/v_S + F_c tanh(v/v_C) + f v with v_S = √2 v_b and v_C = v_b/10 (MathWorks,
     /// Translational Friction).
@@ -142,16 +134,6 @@ impl Friction {
         let FrictionConfig { bristle_deflection_m, breakaway_ratio, breakaway_speed_m_s, .. } = self.config;
         let excess = (breakaway_ratio - 1.0) * (-(speed_m_s / breakaway_speed_m_s).powi(2)).exp();
         1.0 + step_s * speed_m_s.abs() / (bristle_deflection_m * (1.0 + excess))
-    }
-
-    /// `lugre`: the deflection of bristles that carry Coulomb friction, m.
-    pub fn bristle_deflection_m(&self) -> f64 {
-        self.config.bristle_deflection_m
-    }
-
-    /// Viscous friction of an axis, N per m/s.
-    pub fn viscous_n_s_per_m(&self) -> f64 {
-        self.viscous_n_s_per_m
     }
 
     /// Damping D of hinges and ball joints, N s/m to N m s/rad: their friction is the wrench −D V for the platform's
