@@ -14,62 +14,26 @@ const BATCH: usize = 16;
 /// Publishes frames and numbers them.
 #[derive(Debug)]
 pub struct FramePublisher {
-    port: Box<dyn Outgoing>,
+    port: Outlet<[FrameTap]>,
     sent: u64,
 }
 
 /// Receives frames, oldest first. Keeps up to [`Message::DEPTH`] frames, fewer with batches that are not full.
 #[derive(Debug)]
-pub struct FrameSubscriber(Box<dyn Incoming>);
+pub struct FrameSubscriber(Inlet<[FrameTap]>);
 
 /// Several frames in shared memory.
 type Batch = Sample<ipc::Service, [FrameTap], ()>;
 
-/// The port of a publisher, behind a pointer for the reason of [`Topic`](super::Topic).
-trait Outgoing: Connecting {
-    /// Sends this many frames: `next` makes each in shared memory, `stamp` completes the batch.
-    fn send(
-        &self,
-        count: usize,
-        next: &mut dyn FnMut() -> FrameTap,
-        stamp: &mut dyn FnMut(&mut [FrameTap]),
-    ) -> Result<(), TransportError>;
-    fn warm_up(&self) -> Result<(), TransportError>;
-}
-
-/// The port of a subscriber.
-trait Incoming: Connecting {
-    fn next(&self) -> Result<Option<Batch>, TransportError>;
-}
-
-impl Outgoing for Outlet<[FrameTap]> {
-    fn send(
-        &self,
-        count: usize,
-        next: &mut dyn FnMut() -> FrameTap,
-        stamp: &mut dyn FnMut(&mut [FrameTap]),
-    ) -> Result<(), TransportError> {
-        let sample = self.inner.loan_slice_uninit(count).map_err(failed("loaning", FrameTap::TOPIC))?;
-        let mut sample = sample.write_from_fn(|_| next());
-        stamp(sample.payload_mut());
-        sample.send().map_err(failed("sending", FrameTap::TOPIC))?;
-        Ok(())
-    }
-
-    fn warm_up(&self) -> Result<(), TransportError> {
-        let sample = self.inner.loan_slice_uninit(BATCH).map_err(failed("loaning", FrameTap::TOPIC))?;
-        drop(sample.write_from_fn(|_| FrameTap::default()));
-        Ok(())
-    }
-}
-
-impl Incoming for Inlet<[FrameTap]> {
-    fn next(&self) -> Result<Option<Batch>, TransportError> {
-        let sample = self.inner.receive().map_err(failed("receiving", FrameTap::TOPIC))?;
-        self.require_all_connections()?;
-        sample.iter().flat_map(|sample| sample.iter()).try_for_each(check_version)?;
-        Ok(sample)
-    }
+/// Sends this many frames, each of which `next` makes. Not generic, for the reason of [`Topic`](super::Topic).
+fn send(
+    outlet: &Outlet<[FrameTap]>,
+    count: usize,
+    next: &mut dyn FnMut() -> FrameTap,
+) -> Result<(), TransportError> {
+    let sample = outlet.inner.loan_slice_uninit(count).map_err(failed("loaning", FrameTap::TOPIC))?;
+    sample.write_from_fn(|_| next()).send().map_err(failed("sending", FrameTap::TOPIC))?;
+    Ok(())
 }
 
 fn service(node: &Node) -> Result<PortFactory<ipc::Service, [FrameTap], ()>, TransportError> {
@@ -82,9 +46,8 @@ impl FramePublisher {
     pub fn open(node: &Node) -> Result<Self, TransportError> {
         let service = service(node)?;
         let builder = service.publisher_builder().initial_max_slice_len(BATCH);
-        let outlet =
-            Outlet::create(builder.allocation_strategy(AllocationStrategy::Static), FrameTap::TOPIC)?;
-        Ok(Self { port: Box::new(outlet), sent: 0 })
+        let builder = builder.allocation_strategy(AllocationStrategy::Static);
+        Ok(Self { port: Outlet::create(builder, FrameTap::TOPIC)?, sent: 0 })
     }
 
     /// The number of samples for this many frames.
@@ -105,14 +68,12 @@ impl FramePublisher {
     ) -> Result<(), TransportError> {
         let mut frames = frames.into_iter();
         while frames.len() > 0 {
-            let (count, sent) = (frames.len().min(BATCH), &mut self.sent);
-            let mut next = || frames.next().expect("`count` is at most its length");
-            self.port.send(count, &mut next, &mut |batch| {
-                let published_ns = now_ns();
-                for frame in batch {
-                    *sent += 1;
-                    frame.stamp(*sent, published_ns);
-                }
+            let (published_ns, sent) = (now_ns(), &mut self.sent);
+            send(&self.port, frames.len().min(BATCH), &mut || {
+                let mut frame = frames.next().expect("a batch has no more than there are");
+                *sent += 1;
+                frame.stamp(*sent, published_ns);
+                frame
             })?;
         }
         Ok(())
@@ -120,7 +81,9 @@ impl FramePublisher {
 
     /// Touches the memory of the next batch, as the `warm_up` of a publisher of single messages.
     pub fn warm_up(&self) -> Result<(), TransportError> {
-        self.port.warm_up()
+        let sample = self.port.inner.loan_slice_uninit(BATCH).map_err(failed("loaning", FrameTap::TOPIC))?;
+        drop(sample.write_from_fn(|_| FrameTap::default()));
+        Ok(())
     }
 }
 
@@ -128,13 +91,16 @@ impl FrameSubscriber {
     /// A subscriber of the topic of frames.
     pub fn open(node: &Node) -> Result<Self, TransportError> {
         let service = service(node)?;
-        Ok(Self(Box::new(Inlet::create(service.subscriber_builder(), FrameTap::TOPIC)?)))
+        Ok(Self(Inlet::create(service.subscriber_builder(), FrameTap::TOPIC)?))
     }
 
     /// The oldest waiting batch; never waits. Refuses after a failed connection to a publisher, because its frames are
     /// missing.
     pub fn receive(&self) -> Result<Option<Batch>, TransportError> {
-        self.0.next()
+        let batch = self.0.inner.receive().map_err(failed("receiving", FrameTap::TOPIC))?;
+        self.0.require_all_connections()?;
+        batch.iter().flat_map(|frames| frames.iter()).try_for_each(check_version)?;
+        Ok(batch)
     }
 }
 
