@@ -100,13 +100,11 @@ fn choose(session: Option<PathBuf>, of_user: &[PathBuf]) -> Result<Vec<PathBuf>,
     let of_session = session.filter(|_| passed_over.is_none()).map(|session| session.join("masseter"));
     let of_root = geteuid().is_root().then(|| PathBuf::from("/run/masseter"));
     let preferred = of_session.or(of_root).filter(|path| make(path).is_ok());
-    let found: Vec<_> = match &preferred {
-        Some(path) => make_folder_private(path)?.then(|| path.clone()).into_iter().collect(),
-        None => private_ones(of_user)?,
-    };
+    let candidates = preferred.map_or_else(|| of_user.to_vec(), |path| vec![path]);
+    let found = private_ones(&candidates)?;
     if found.is_empty() {
-        let path = preferred.unwrap_or_else(|| of_user[0].clone());
-        return Err(DomainError::NotPrivate { path, passed_over: passed_over.unwrap_or_default() });
+        let (path, passed_over) = (candidates[0].clone(), passed_over.unwrap_or_default());
+        return Err(DomainError::NotPrivate { path, passed_over });
     }
     Ok(found)
 }

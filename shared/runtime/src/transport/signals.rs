@@ -48,12 +48,8 @@ impl SignalReceiver {
     /// When the socket cannot be made.
     pub fn open(node: &Node, name: &str, timeout: Duration) -> Result<Self, DomainError> {
         let path = node.domain().root().join(name);
-        let bind = || {
-            let socket = UnixDatagram::bind(&path)?;
-            socket.set_read_timeout(Some(timeout))?;
-            Ok(socket)
-        };
-        let socket = bind().map_err(file_error("receive at", &path))?;
+        let socket = UnixDatagram::bind(&path).map_err(file_error("receive at", &path))?;
+        socket.set_read_timeout(Some(timeout)).map_err(file_error("receive at", &path))?;
         Ok(Self { socket, path, sleeps: 0, next_sleeps: SLEEPS[0] })
     }
 
@@ -121,12 +117,8 @@ impl SignalSender {
     /// When the socket cannot be made.
     pub fn open(node: &Node, receiver: &str) -> Result<Self, DomainError> {
         let path = node.domain().root().join(receiver);
-        let unbound = || {
-            let socket = UnixDatagram::unbound()?;
-            socket.set_write_timeout(Some(SEND_TIMEOUT))?;
-            Ok(socket)
-        };
-        let socket = unbound().map_err(file_error("send to", &path))?;
+        let socket = UnixDatagram::unbound().map_err(file_error("send to", &path))?;
+        socket.set_write_timeout(Some(SEND_TIMEOUT)).map_err(file_error("send to", &path))?;
         Ok(Self { socket, path })
     }
 
