@@ -284,7 +284,7 @@ fn a_second_program_another_version_and_a_stranger_are_refused_and_the_run_goes_
     let stranger = answer_to("GET / HTTP/1.1");
     assert!(stranger.contains("refused") && stranger.contains("greeting"), "{stranger}");
 
-    let hello = serde_json::to_string(&attach::Hello::new()).unwrap();
+    let hello = serde_json::to_string(&attach::Hello::default()).unwrap();
     let mut first = UnixStream::connect(&path).unwrap();
     writeln!(first, "{hello}").unwrap();
     let mut answer = String::new();
@@ -359,7 +359,7 @@ fn answer_to(name: &str, report: &str) -> String {
     let stream = UnixStream::connect(socket(&Domain::named(name).unwrap())).unwrap();
     let mut input = BufReader::new(&stream);
     let mut answers = String::new();
-    for said in [line(&Hello::new()), format!("{report}\n")] {
+    for said in [line(&Hello::default()), format!("{report}\n")] {
         (&stream).write_all(said.as_bytes()).unwrap();
         input.read_line(&mut answers).unwrap();
     }

@@ -34,9 +34,9 @@ pub struct Hello {
     pub layouts: Vec<String>,
 }
 
-impl Hello {
+impl Default for Hello {
     /// The greeting of a program built from this version.
-    pub fn new() -> Self {
+    fn default() -> Self {
         let layouts = [
             Reading::SHARED_MEMORY_NAME,
             Command::SHARED_MEMORY_NAME,
@@ -45,20 +45,16 @@ impl Hello {
         ];
         Self { layouts: layouts.map(str::to_owned).to_vec() }
     }
+}
 
+impl Hello {
     /// The first layout that differs from this version, quoted for messages, with this version's layout; none without a
     /// difference.
     pub fn difference(&self) -> Option<(String, String)> {
         let theirs = self.layouts.iter().map(String::as_str).chain(iter::repeat(""));
-        let mut pairs = theirs.zip(Self::new().layouts);
+        let mut pairs = theirs.zip(Self::default().layouts);
         let (theirs, own) = pairs.find(|(theirs, own)| theirs != own)?;
         Some((excerpt(theirs), own))
-    }
-}
-
-impl Default for Hello {
-    fn default() -> Self {
-        Self::new()
     }
 }
 
@@ -98,16 +94,16 @@ impl Invitation {
 #[derive(Debug, thiserror::Error)]
 pub enum AttachError {
     /// No rig of that name waits for a controller.
-    #[error("no rig named '{name}' takes a controller; {waiting}")]
+    #[error("no rig named '{name}' takes a controller; {}", choice_of(.waiting))]
     NoSuchRig {
         /// The name.
         name: String,
         /// The rigs that wait.
-        waiting: Waiting,
+        waiting: Vec<String>,
     },
     /// A request without a name needs exactly one rig.
-    #[error("there is not one rig to attach to; {0}")]
-    NotOneRig(Waiting),
+    #[error("there is not one rig to attach to; {}", choice_of(.0))]
+    NotOneRig(Vec<String>),
     /// The rig refused the program.
     #[error("the rig '{rig}' refuses this program: {reason}")]
     Refused {
@@ -132,17 +128,12 @@ pub enum AttachError {
     Process(#[from] ProcessError),
 }
 
-/// The names of the rigs that take a controller.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Waiting(pub Vec<String>);
-
-impl std::fmt::Display for Waiting {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        if self.0.is_empty() {
-            return f.write_str("none runs: start one with 'masseter run --controller external --name NAME'");
-        }
-        write!(f, "those that do: {}; choose one by its name or by {RIG_VARIABLE}", self.0.join(", "))
+/// What to do, by the names of the rigs that take a controller.
+fn choice_of(waiting: &[String]) -> String {
+    if waiting.is_empty() {
+        return "none runs: start one with 'masseter run --controller external --name NAME'".to_owned();
     }
+    format!("those that do: {}; choose one by its name or by {RIG_VARIABLE}", waiting.join(", "))
 }
 
 /// The socket on which the rig of this domain listens.
@@ -174,7 +165,7 @@ pub fn attach(rig: Option<&str>) -> Result<ProcessContext, AttachError> {
         return Err(AttachError::NoSuchRig { name: rig, waiting: waiting()? });
     };
     // The rig sends no more bytes before this program is ready.
-    let invitation = match conversation.ask(&Hello::new()) {
+    let invitation = match conversation.ask(&Hello::default()) {
         Ok(Answer::Invited(invitation)) => invitation,
         Ok(Answer::Refused { reason }) => return Err(AttachError::Refused { rig, reason }),
         Err(left) => return Err(AttachError::NoAnswer { rig, left }),
@@ -188,13 +179,12 @@ pub fn attach(rig: Option<&str>) -> Result<ProcessContext, AttachError> {
 
 fn only_rig() -> Result<String, AttachError> {
     let waiting = waiting()?;
-    match &waiting.0[..] {
+    match &waiting[..] {
         [rig] => Ok(rig.clone()),
         _ => Err(AttachError::NotOneRig(waiting)),
     }
 }
 
-fn waiting() -> Result<Waiting, DomainError> {
-    let domains = Domain::serving(SOCKET)?;
-    Ok(Waiting(domains.iter().map(|domain| domain.id().to_owned()).collect()))
+fn waiting() -> Result<Vec<String>, DomainError> {
+    Ok(Domain::serving(SOCKET)?.iter().map(|domain| domain.id().to_owned()).collect())
 }
