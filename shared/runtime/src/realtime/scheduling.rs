@@ -50,29 +50,18 @@ pub struct Obtained {
 pub fn obtain(request: SchedulingRequest) -> Obtained {
     let pinned = request.core.map_or(Ok(()), |core| stay_on(&[core]));
     let fifo = request.fifo_priority.map_or(Ok(()), fifo::set);
-    let locked = if request.locked_memory {
-        mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(io::Error::from)
-    } else {
-        Ok(())
-    };
+    let lock = || mlockall(MlockAllFlags::CURRENT | MlockAllFlags::FUTURE).map_err(io::Error::from);
+    let locked = if request.locked_memory { lock() } else { Ok(()) };
     let (core, fifo_priority, locked_memory) = (pinned_core(), fifo::get(), is_locked());
-    let mut refusals = Vec::new();
-    if let Some(requested) = request.core
-        && let Some(why) = refusal(pinned, core == Some(requested))
-    {
-        refusals.push(refused_core(requested, &why, &usable_cores()));
-    }
-    let mut refuse = |what: String, why: String| {
-        refusals.push(format!("{what} refused ({why}): 'masseter doctor' shows how to allow it"));
-    };
-    if let Some(requested) = request.fifo_priority
-        && let Some(why) = refusal(fifo, fifo_priority == Some(requested))
-    {
-        refuse(format!("SCHED_FIFO {requested}"), why);
-    }
-    if let Some(why) = refusal(locked, locked_memory || !request.locked_memory) {
-        refuse("locked memory".to_owned(), why);
-    }
+    let of_core = request.core.zip(refusal(pinned, core == request.core));
+    let of_core = of_core.map(|(requested, why)| refused_core(requested, &why, &usable_cores()));
+    let refused =
+        |what: String, why| format!("{what} refused ({why}): 'masseter doctor' shows how to allow it");
+    let of_fifo = request.fifo_priority.zip(refusal(fifo, fifo_priority == request.fifo_priority));
+    let of_fifo = of_fifo.map(|(requested, why)| refused(format!("SCHED_FIFO {requested}"), why));
+    let of_memory = refusal(locked, locked_memory || !request.locked_memory);
+    let of_memory = of_memory.map(|why| refused("locked memory".to_owned(), why));
+    let refusals = of_core.into_iter().chain(of_fifo).chain(of_memory).collect();
     Obtained { requested: request, core, fifo_priority, locked_memory, refusals }
 }
 
