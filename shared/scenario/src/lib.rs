@@ -32,34 +32,22 @@ mod study;
 mod when;
 pub mod wording;
 
-pub use can::{CanConfig, MASTER_NODE};
-pub use control::{
-    AFTER_STOP_S, ChecksConfig, ControllerConfig, ControllerState, CpuDmaLatency, DryConfig,
-    MOST_LEAD_CYCLES, RealtimeConfig, RecordingConfig, TimingConfig, TrajectoryLimitsConfig,
-};
-pub use drive_profile::{
-    AccelerationUnit, BrakeConfig, DcfRead, DriveProfile, HomingConfig, INCREMENTS, IdentityConfig,
-    ObjectConfig, ObjectKey, ObjectRule, PdosConfig, StoreConfig, UnitsConfig, VelocityUnit,
-};
-pub use drives::{AxisScale, DriveConfig, DrivesConfig};
+pub use can::*;
+pub use control::*;
+pub use drive_profile::*;
+pub use drives::*;
 pub use error::ScenarioError;
-pub use faults::{
-    AxisFault, BusFault, CommandFault, DriveFault, EncoderFault, FaultConfig, FaultDeclaration,
-    FaultKindConfig, FaultSize, Overlap, PlatformFault, ProcessFault,
-};
-pub use force::{
-    BiteProfile, ForceControlConfig, ForceEstimateConfig, ForceFusion, ForceSource, LateralForceConfig,
-    LoadCellConfig, ProbeConfig,
-};
-pub use jaw::{FoodConfig, JawConfig, MOST_PAIRS, Material, TeethConfig, ToothConfig};
+pub use faults::*;
+pub use force::*;
+pub use jaw::*;
 pub use masseter_model::dynamics::{AxesConfig, DynamicsConfig, FrictionConfig, FrictionModel};
 pub use masseter_model::section::{Key, Range, unit_of};
-pub use matrix::{Matrix, MatrixCase};
+pub use matrix::*;
 pub use motion::*;
-pub use quantity::{Dimension, Quantity, QuantityError, UNITS, Unit};
-pub use quirks::{INCREMENTS_PER_TURN, QuirkConfig, QuirkKindConfig};
-pub use requirements::{During, ExpectConfig, ExpectedVerdict, RequirementConfig, Statistic, TimeWindow};
+pub use quantity::*;
+pub use quirks::*;
+pub use requirements::*;
 pub use scenario::{RATES_HZ, Scenario};
-pub use stimuli::{Shape, StimulusConfig};
+pub use stimuli::*;
 pub use study::StudyConfig;
-pub use when::{EntryNames, Start, When};
+pub use when::*;

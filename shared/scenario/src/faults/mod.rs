@@ -15,10 +15,7 @@ use super::quantity::Quantity;
 use super::when::{EntryNames, When, WhenKeys};
 use crate::wording::listed;
 
-pub use kinds::{
-    AxisFault, BusFault, CommandFault, DriveFault, EncoderFault, FaultDeclaration, FaultKindConfig,
-    FaultSize, Overlap, PlatformFault, ProcessFault,
-};
+pub use kinds::*;
 
 keys! {
     /// One fault.
