@@ -4,6 +4,7 @@
 //! line, so a quote without its partner is a part of the field.
 
 use std::io::{self, BufRead, Read};
+use std::iter;
 
 use crate::{input::excerpt, wording::counted};
 
@@ -31,8 +32,15 @@ pub struct Line {
 /// assert_eq!(numbers(&row.text.unwrap(), &["t_s", "x_m"]), Ok(vec![0.5, 2.0]));
 /// ```
 pub fn lines(source: impl BufRead) -> impl Iterator<Item = Line> {
-    let numbered = (1..).zip(Bounded { source, rest: Rest::NextLine });
-    let lines = numbered.map(|(number, text)| Line { number, text });
+    let (mut source, mut is_cut) = (Some(source), false);
+    let texts = iter::from_fn(move || {
+        let line = read_line(source.as_mut()?, &mut is_cut);
+        if !matches!(line, Ok(Some(_))) {
+            source = None;
+        }
+        line.unwrap_or_else(|error| Some(Err(error.to_string())))
+    });
+    let lines = (1..).zip(texts).map(|(number, text)| Line { number, text });
     lines.filter(|line| !line.text.as_ref().is_ok_and(|text| text.starts_with('#')))
 }
 
@@ -67,53 +75,19 @@ fn finite_number(text: &str, column: &str) -> Result<f64, String> {
     })
 }
 
-/// Lines of at most [`LONGEST_LINE`] bytes. A longer line is an error; a longer comment is cut.
-struct Bounded<R> {
-    source: R,
-    rest: Rest,
-}
-
-/// The next part to read.
-enum Rest {
-    NextLine,
-    /// The last line is longer than the limit. The search for its end waits for the next call, because there may be no
-    /// end.
-    OfLongLine,
-    Nothing,
-}
-
-impl<R: BufRead> Bounded<R> {
-    fn read(&mut self) -> io::Result<Option<Result<String, String>>> {
-        if matches!(self.rest, Rest::OfLongLine) {
-            self.source.skip_until(b'\n')?;
-        }
-        let mut line = Vec::new();
-        (&mut self.source).take(LONGEST_LINE as u64).read_until(b'\n', &mut line)?;
-        let is_cut = line.len() == LONGEST_LINE && !line.ends_with(b"\n");
-        self.rest = match line.is_empty() {
-            true => Rest::Nothing,
-            false if is_cut => Rest::OfLongLine,
-            false => Rest::NextLine,
-        };
-        let text = String::from_utf8_lossy(&line).trim_start_matches(BYTE_ORDER_MARK).trim().to_owned();
-        let is_refused = is_cut && !text.starts_with('#');
-        let text = if is_refused { Err(format!("longer than {LONGEST_LINE} bytes")) } else { Ok(text) };
-        Ok((!line.is_empty()).then_some(text))
+/// The next line, of at most [`LONGEST_LINE`] bytes. A longer line is an error; a longer comment is cut. The search for the
+/// end of such a line waits for the next call, because there may be no end.
+fn read_line(source: &mut impl BufRead, is_cut: &mut bool) -> io::Result<Option<Result<String, String>>> {
+    if *is_cut {
+        source.skip_until(b'\n')?;
     }
-}
-
-impl<R: BufRead> Iterator for Bounded<R> {
-    type Item = Result<String, String>;
-
-    fn next(&mut self) -> Option<Self::Item> {
-        if matches!(self.rest, Rest::Nothing) {
-            return None;
-        }
-        self.read().unwrap_or_else(|error| {
-            self.rest = Rest::Nothing;
-            Some(Err(error.to_string()))
-        })
-    }
+    let mut line = Vec::new();
+    source.take(LONGEST_LINE as u64).read_until(b'\n', &mut line)?;
+    *is_cut = line.len() == LONGEST_LINE && !line.ends_with(b"\n");
+    let text = String::from_utf8_lossy(&line).trim_start_matches(BYTE_ORDER_MARK).trim().to_owned();
+    let is_refused = *is_cut && !text.starts_with('#');
+    let text = if is_refused { Err(format!("longer than {LONGEST_LINE} bytes")) } else { Ok(text) };
+    Ok((!line.is_empty()).then_some(text))
 }
 
 #[cfg(test)]
