@@ -51,21 +51,12 @@ impl<'a> Document<'a> {
     /// The key of the table `path` whose removal makes the whole text valid. Serde reads some tables whole, and its
     /// error names no key of them.
     pub(super) fn culprit<T: Deserialize<'a>>(&self, path: &str) -> Option<String> {
-        let without = |key: Option<&str>| {
-            let mut root = self.root.clone();
-            let mut table = &mut root;
-            for name in path.split('.') {
-                let DeValue::Table(inner) = table.get_mut(name)?.get_mut() else { return None };
-                table = inner;
-            }
-            let keys: Vec<_> = table.keys().map(|key| key.get_ref().clone()).collect();
-            key.map(|key| table.remove(key));
-            Some((root, keys))
-        };
-        let (_, keys) = without(None)?;
+        let keys: Vec<_> =
+            table_at(&mut self.root.clone(), path)?.keys().map(Spanned::get_ref).cloned().collect();
         let is_culprit = |key: &&Cow<str>| {
-            let rest = without(Some(key)).map(|(root, _)| Deserializer::from(Spanned::new(0..0, root)));
-            rest.is_some_and(|rest| T::deserialize(rest).is_ok())
+            let mut rest = self.root.clone();
+            table_at(&mut rest, path).map(|table| table.remove(&***key));
+            T::deserialize(Deserializer::from(Spanned::new(0..0, rest))).is_ok()
         };
         let culprit = keys.iter().take(MOST_SUSPECTS).find(is_culprit)?;
         Some(format!("{path}.{culprit}"))
@@ -76,6 +67,13 @@ impl<'a> Document<'a> {
         let (key, offset) = unnamed_in(&self.root, resolved)?;
         Some((key, place_in(self.path, self.text, offset)))
     }
+}
+
+fn table_at<'t, 'a>(root: &'t mut DeTable<'a>, path: &str) -> Option<&'t mut DeTable<'a>> {
+    path.split('.').try_fold(root, |table, name| match table.get_mut(name)?.get_mut() {
+        DeValue::Table(inner) => Some(inner),
+        _ => None,
+    })
 }
 
 /// The value of nested keys: in the table of that number for a key of a list of tables, and null where that table lacks

@@ -211,12 +211,8 @@ impl ForceControlConfig {
         cell: Option<&'a LoadCellConfig>,
         is_emulated: bool,
     ) -> Result<Option<&'a LoadCellConfig>, ScenarioError> {
-        match self.source {
-            ForceSource::Estimate => Ok(None),
-            ForceSource::LoadCell => {
-                require_cell("force_control.source", cell, is_emulated, "estimate").map(Some)
-            }
-        }
+        let is_source = self.source == ForceSource::LoadCell;
+        is_source.then(|| require_cell("force_control.source", cell, is_emulated, "estimate")).transpose()
     }
 
     /// Refuses values without use, and a damping below the limit of stability. The delays (s) are the lead and that of

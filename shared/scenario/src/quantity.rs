@@ -187,7 +187,7 @@ impl Dimension {
 /// use masseter_scenario::{Dimension, Quantity};
 ///
 /// let limit: Quantity = "2 mm".parse()?;
-/// assert_eq!((limit.si(), limit.dimension()), (0.002, Dimension::Length));
+/// assert_eq!((limit.si(), limit.unit().dimension), (0.002, Dimension::Length));
 /// assert_eq!("50 furlong".parse::<Quantity>().unwrap_err().to_string(), "'50 furlong': the unit 'furlong' is unknown");
 /// # Ok::<(), masseter_scenario::QuantityError>(())
 /// ```
@@ -221,17 +221,12 @@ impl Quantity {
         self.unit
     }
 
-    /// What it measures.
-    pub fn dimension(&self) -> Dimension {
-        self.unit.dimension
-    }
-
     /// The value in SI units, if it has this dimension.
     ///
     /// # Errors
     /// A sentence with the remedy.
     pub fn si_of(&self, dimension: Dimension) -> Result<f64, String> {
-        if self.dimension() == dimension {
+        if self.unit.dimension == dimension {
             return Ok(self.si());
         }
         Err(match dimension {
@@ -337,7 +332,7 @@ mod tests {
         ] {
             let quantity: Quantity = text.parse().unwrap();
             assert!((quantity.si() - si).abs() <= 1e-15 * si.abs().max(1.0), "{text}: {quantity:?}");
-            assert_eq!(quantity.dimension(), dimension, "{text}");
+            assert_eq!(quantity.unit().dimension, dimension, "{text}");
         }
     }
 

@@ -35,16 +35,14 @@ pub struct EntryNames<'a> {
 
 impl<'a> EntryNames<'a> {
     pub(super) fn new(faults: Vec<&'a str>, stimuli: Vec<&'a str>) -> Self {
-        let of = |list: &str, name: &str| format!("{list}.{name}");
-        let states = ControllerState::ALL.iter();
-        let states = states.map(|state| (of("controller", state.name()), Start::State(*state)));
-        let named_faults =
-            faults.iter().enumerate().map(|(place, name)| (of("fault", name), Start::Fault(place)));
-        let named_stimuli = stimuli.iter().enumerate();
-        let named_stimuli = named_stimuli.map(|(place, name)| (of("stimulus", name), Start::Stimulus(place)));
+        let states =
+            ControllerState::ALL.iter().map(|state| ("controller", state.name(), Start::State(*state)));
+        let of_faults = (0..).zip(&faults).map(|(place, name)| ("fault", *name, Start::Fault(place)));
+        let of_stimuli = (0..).zip(&stimuli).map(|(place, name)| ("stimulus", *name, Start::Stimulus(place)));
         let mut starts = BTreeMap::new();
-        for (name, start) in states.chain(named_faults).chain(named_stimuli) {
-            starts.entry(name).and_modify(|start| *start = None).or_insert(Some(start));
+        for (list, name, start) in states.chain(of_faults).chain(of_stimuli) {
+            let known = starts.entry(format!("{list}.{name}"));
+            known.and_modify(|start| *start = None).or_insert(Some(start));
         }
         Self { faults, stimuli, starts }
     }
