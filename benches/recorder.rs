@@ -6,7 +6,6 @@
 //! The messages are those of a run under virtual time, played again and again at the pace of the clock by a thread with
 //! the real time of a run.
 
-use std::convert::Infallible;
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -225,7 +224,7 @@ fn play(cycles: &[Vec<Recorded>], publishers: &mut Publishers) -> anyhow::Result
     let mut at_hand = AtHand::default();
     for cycle in cycles.iter().cycle().take((RATE_HZ * SECONDS) as usize) {
         at_hand.take(cycle);
-        let Ok(wake) = pace.wait_warm(|| Ok::<_, Infallible>(()));
+        let wake = pace.wait();
         publishers.publish_cycle(&at_hand)?;
         let messages = cycle.len().max(1) as u64;
         publishing.record((clock::now_ns() - wake.woke_ns) / messages)?;

@@ -7,6 +7,8 @@
 
 pub mod scheduling;
 
+use std::convert::Infallible;
+
 use crate::clock;
 
 /// A spinning task reads the clock every fraction of a microsecond, and the work of a cycle takes tens of microseconds. A
@@ -102,7 +104,13 @@ impl Cycle {
         self.next
     }
 
-    /// Waits for the next deadline: sleeps, calls `warm_up` if there is time, then spins the last stretch. `warm_up` may do
+    /// Waits for the next deadline: sleeps, then spins the last stretch.
+    pub fn wait(&mut self) -> Wake {
+        let Ok(wake) = self.wait_warm(|| Ok::<_, Infallible>(()));
+        wake
+    }
+
+    /// As [`Self::wait`], with one call of `warm_up` shortly before the deadline if there is time. `warm_up` may do
     /// work of the cycle early, and brings code and data back into the caches.
     ///
     /// # Errors
