@@ -74,7 +74,7 @@ impl ForceEstimateConfig {
 
 /// The load cell that the value "load_cell" of a key needs; `instead` is the value without one. Only the emulated jaw has a
 /// load cell.
-fn require_cell<'a>(
+pub(super) fn require_cell<'a>(
     key: &str,
     cell: Option<&'a LoadCellConfig>,
     is_emulated: bool,
@@ -205,22 +205,10 @@ impl ForceControlConfig {
         FRAC_2_PI * stiffness_n_per_m * delay_s
     }
 
-    /// The load cell of the control; none for control by the estimate.
-    pub(super) fn cell<'a>(
-        &self,
-        cell: Option<&'a LoadCellConfig>,
-        is_emulated: bool,
-    ) -> Result<Option<&'a LoadCellConfig>, ScenarioError> {
-        let is_source = self.source == ForceSource::LoadCell;
-        is_source.then(|| require_cell("force_control.source", cell, is_emulated, "estimate")).transpose()
-    }
-
-    /// Refuses values without use, and a damping below the limit of stability. The delays (s) are the lead and that of
-    /// the observer or the load cell.
-    pub(super) fn validate(&self, lead_s: f64, source_s: f64) -> Checked {
+    /// Refuses values without use, and a damping below the limit of stability with this delay of the loop.
+    pub(super) fn validate(&self, delay_s: f64) -> Checked {
         self.check_ranges(ranges_of("force_control"))?;
         require_range("force_control.peak_n", Range::Within(self.contact_n, 1000.0), self.peak_n)?;
-        let delay_s = Self::delay_s(lead_s, source_s);
         let Self { damping_n_s_per_m, food_stiffness_n_per_m, tooth_damping_n_s_per_m, .. } = *self;
         for (key, damping, stiffness) in [
             ("damping_n_s_per_m", damping_n_s_per_m, food_stiffness_n_per_m),
@@ -316,6 +304,9 @@ impl LoadCellConfig {
 mod tests {
     use super::*;
 
+    /// Of a lead of 2 ms and an observer of 3 ms.
+    const DELAY_S: f64 = 0.005 + ForceControlConfig::MASS_TIME_S;
+
     #[test]
     fn a_damping_below_the_limit_of_stability_is_refused_with_the_limit() {
         let control = ForceControlConfig::default();
@@ -332,7 +323,7 @@ mod tests {
             ),
             (ForceControlConfig { peak_n: 5.0, ..control }, Some("force_control.peak_n = 5: use 10 to 1000")),
         ] {
-            let said = control.validate(0.002, 0.003).map_err(|error| error.to_string());
+            let said = control.validate(DELAY_S).map_err(|error| error.to_string());
             match reason {
                 None => assert_eq!(said, Ok(())),
                 Some(reason) => assert!(said.as_ref().is_err_and(|said| said.contains(reason)), "{said:?}"),
@@ -342,9 +333,8 @@ mod tests {
 
     #[test]
     fn lateral_control_needs_the_estimate_and_no_more_force_than_the_bite() {
-        let refusal = |control: ForceControlConfig| {
-            control.validate(0.002, 0.003).map_err(|error| error.to_string()).err()
-        };
+        let refusal =
+            |control: ForceControlConfig| control.validate(DELAY_S).map_err(|error| error.to_string()).err();
         let of = |peak_n| ForceControlConfig {
             lateral: Some(LateralForceConfig { peak_n, ..LateralForceConfig::default() }),
             ..ForceControlConfig::default()

@@ -12,6 +12,7 @@ use super::error::{
     Checked, LONGEST_S, ScenarioError, ranges_of, read_limited, require, require_each, require_range,
     require_word,
 };
+use super::force::require_cell;
 use super::jaw::over_food;
 use super::matrix::Matrix;
 use super::merge::{LISTS, append_lists, merge, robot_tables, with_absolute_paths};
@@ -397,24 +398,21 @@ impl Scenario {
     fn validate_forces(&self) -> Checked {
         let estimate = self.force_estimate.unwrap_or_default();
         estimate.check_ranges(ranges_of("force_estimate"))?;
-        if let Some(cell) = &self.load_cell {
+        let (cell, is_emulated) = (self.load_cell.as_ref(), self.can.is_virtual());
+        if let Some(cell) = cell {
             cell.check_ranges(ranges_of("load_cell"))?;
             let need = "leave the table away with can.interfaces: the rig reads no load cell there";
-            require(self.can.is_virtual(), "load_cell", &"given", need)?;
+            require(is_emulated, "load_cell", &"given", need)?;
         }
         let peak_n = self.force_control.map_or(0.0, |control| control.peak_n);
-        estimate.require_fusible(self.load_cell.as_ref(), self.can.is_virtual(), peak_n)?;
+        estimate.require_fusible(cell, is_emulated, peak_n)?;
         if let Some(control) = &self.force_control {
-            let cell = control.cell(self.load_cell.as_ref(), self.can.is_virtual())?;
-            control.validate(self.lead_s(), self.source_s(control))?;
-            cell.map_or(Ok(()), |cell| cell.require_for(control))?;
+            let source = || require_cell("force_control.source", cell, is_emulated, "estimate");
+            let source = (control.source == ForceSource::LoadCell).then(source).transpose()?;
+            control.validate(self.force_delay_s(control))?;
+            source.map_or(Ok(()), |cell| cell.require_for(control))?;
         }
         if self.is_force_estimated() { dynamics::require_open_screws(&self.model().friction) } else { Ok(()) }
-    }
-
-    /// Time from a sample until the drives have followed the command that answers it, s.
-    fn lead_s(&self) -> f64 {
-        self.controller.lead_cycles * self.period_s()
     }
 
     /// Delay of the force that this control has, s.
@@ -425,9 +423,10 @@ impl Scenario {
         }
     }
 
-    /// Delay of the loop of this control, s.
+    /// Delay of the loop of this control, s, with the time until the drives have followed the command that answers a sample.
     pub fn force_delay_s(&self, control: &ForceControlConfig) -> f64 {
-        ForceControlConfig::delay_s(self.lead_s(), self.source_s(control))
+        let lead_s = self.controller.lead_cycles * self.period_s();
+        ForceControlConfig::delay_s(lead_s, self.source_s(control))
     }
 
     /// The force limit of the drive of an axis (6072h), N: in force control that of a leg depends on the bite force.
