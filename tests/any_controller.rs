@@ -327,6 +327,7 @@ fn a_file_that_is_no_executable_is_refused_before_anything_starts() {
         (plain.to_str().unwrap(), "chmod +x"),
         (workspace.file("none").to_str().unwrap(), "motion, hold, external"),
         (std::env::temp_dir().to_str().unwrap(), "it is a folder"),
+        ("/dev/zero", "it is no regular file"),
         ("moton", "motion, hold, external"),
     ] {
         let output = masseter(&["run", "--controller", controller]);
@@ -397,12 +398,17 @@ fn a_program_that_declares_what_cannot_be_shown_is_refused_and_the_next_one_take
         assert!(answers.contains("refused") && answers.contains(limit), "{answers}");
     }
     assert!(answer_to(&name, "\u{1b}[2J").contains("no report of this version"));
+    // This one never ends its line, and is out as soon as it has said too much.
+    let endless = UnixStream::connect(socket(&Domain::named(&name).unwrap())).unwrap();
+    (&endless).write_all(line(&Hello::new()).as_bytes()).unwrap();
+    while (&endless).write_all(&b"x".repeat(65_536)).is_ok() {}
     assert_eq!(program(&["--rig", &name]).status().unwrap().code(), Some(0));
     let output = rig.wait_with_output().unwrap();
     let said = stderr(&output);
     assert_eq!(output.status.code(), Some(0), "{said}");
     // The first one is named at once, and those of the next second together.
     assert!(said.contains("is refused: ") && said.contains("up to 64"), "{said}");
+    assert!(said.contains("it sent more than 1048576 bytes"), "{said}");
     assert!(said.matches("refused").count() < 8, "{said}");
     assert!(!said.contains(['\u{1b}', '\u{7}']) && said.len() < 8000, "{said}");
 }

@@ -10,7 +10,7 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use masseter_runtime::conversation::{Conversation, Left, Limits, line};
-use masseter_runtime::lifecycle::{End, Order, Party, Report, ReportError, Silence};
+use masseter_runtime::lifecycle::{End, Order, Party, Report, Silence};
 use masseter_runtime::{clock, named::Declared, realtime::scheduling::Obtained};
 use masseter_virtual_time::Requests;
 use rustix::process::{
@@ -223,8 +223,8 @@ pub(super) struct Due {
 pub(super) enum Readiness {
     Ready(Ready),
     NotYet,
-    /// Its report cannot be recorded or shown.
-    Refused(ReportError),
+    /// Its report cannot be recorded or shown, or it has broken a limit of the line.
+    Refused(String),
     /// The process has closed the line.
     Closed,
 }
@@ -265,7 +265,12 @@ impl Reports {
             line = self.conversation.next_line();
         }
         let Some(line) = line else {
-            return if self.has_left() { Readiness::Closed } else { Readiness::NotYet };
+            self.has_left();
+            return match &self.left {
+                None => Readiness::NotYet,
+                Some(Left::Closed) => Readiness::Closed,
+                Some(left) => Readiness::Refused(left.to_string()),
+            };
         };
         match Report::read(&line) {
             Ok(Report::Ready { scheduling, declared }) => Readiness::Ready(Ready { scheduling, declared }),
@@ -277,7 +282,7 @@ impl Reports {
                 self.keep(report);
                 Readiness::NotYet
             }
-            Err(refusal) => Readiness::Refused(refusal),
+            Err(refusal) => Readiness::Refused(refusal.to_string()),
         }
     }
 

@@ -9,7 +9,7 @@ use std::process::{self, Child, Command, ExitStatus, Stdio};
 use std::{ffi::OsString, fs::File, io, os::unix::process::CommandExt};
 
 use masseter_runtime::lifecycle::attach::{Invitation, RIG_VARIABLE};
-use masseter_runtime::lifecycle::{End, Order, ReportError};
+use masseter_runtime::lifecycle::{End, Order};
 use masseter_runtime::{conversation::Left, transport::Domain};
 use rustix::process::{
     Pid, Signal, WaitId, WaitIdOptions, getppid, kill_process_group, set_parent_process_death_signal, waitid,
@@ -179,8 +179,8 @@ impl Program {
     }
 
     /// Tells a program why the rig does not take it. The user of one that was started by hand may correct it.
-    fn send_away(&mut self, refusal: &ReportError) -> anyhow::Result<()> {
-        self.order(&Order::Refused { reason: refusal.to_string() });
+    fn send_away(&mut self, refusal: &str) -> anyhow::Result<()> {
+        self.order(&Order::Refused { reason: refusal.to_owned() });
         self.close();
         self.admitted = None;
         match &self.executable {

@@ -255,7 +255,10 @@ impl FromStr for ControllerChoice {
                     .map_err(|error| error.to_string())
             }
             Ok(found) if found.is_file() => Err(format!("the file is not executable: chmod +x {text}")),
-            Ok(_) => Err("it is a folder: give the executable file of your controller".to_owned()),
+            Ok(found) => {
+                let kind = if found.is_dir() { "a folder" } else { "no regular file" };
+                Err(format!("it is {kind}: give the executable file of your controller"))
+            }
             Err(error) => {
                 Err(format!("use motion, hold, external, none, or the path of an executable file ({error})"))
             }

@@ -8,7 +8,7 @@ use std::ops::Range;
 use masseter_can::canopen::{Cob, NodeId};
 use masseter_can::faults::{Fault, FaultKind, FaultNote};
 use masseter_can::{Bus, CanId, Frame, ReceiveError, Tapped};
-use masseter_model::geometry::{AXES, AXIS_NAMES, LEGS};
+use masseter_model::geometry::{AXES, LEGS};
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_runtime::injection::{Injected, Injection};
 use masseter_runtime::messages::codes::{Cause, EventKind, Source};
@@ -86,20 +86,7 @@ pub(crate) struct DrivePort {
 
 /// The port of each axis' drive; those of a bus follow [`MASTER_PORT`].
 pub(crate) fn drive_ports(can: &CanConfig) -> Result<[DrivePort; AXES], PlantError> {
-    if let Some(bus) = can.buses.iter().position(Vec::is_empty) {
-        return Err(PlantError::Scenario(format!(
-            "can.buses: bus {bus} has no drive, so no node would acknowledge the master's frames; remove this bus"
-        )));
-    }
-    let named = || can.buses.iter().flatten().copied();
-    let times = |axis: usize| named().filter(|&other| other == axis).count();
-    let unknown = named().find(|&axis| axis >= AXES);
-    if let Some(axis) = unknown.or_else(|| (0..AXES).find(|&axis| times(axis) != 1)) {
-        let (times, names) = (times(axis), AXIS_NAMES.join(" "));
-        return Err(PlantError::Scenario(format!(
-            "can.buses: axis {axis} is named {times} times; name each of the axes 0 to 5 ({names}) once"
-        )));
-    }
+    can.check_buses().map_err(|error| PlantError::Scenario(error.to_string()))?;
     let mut ports = [DrivePort { bus: 0, port: MASTER_PORT }; AXES];
     for (bus, axes) in can.buses.iter().enumerate() {
         for (index, &axis) in axes.iter().enumerate() {

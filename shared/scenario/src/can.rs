@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use masseter_can::{Bitrate, BitrateError, canopen::NodeId};
-use masseter_model::geometry::AXES;
+use masseter_model::geometry::{AXES, AXIS_NAMES};
 
 use super::error::{Checked, ScenarioError, ranges_of, require};
 use crate::wording::counted;
@@ -81,6 +81,31 @@ impl CanConfig {
         Ok(if self.ideal { Bitrate::IDEAL } else { bitrate })
     }
 
+    /// Checks that each axis has its place on one bus, and each bus an axis.
+    ///
+    /// # Errors
+    /// [`ScenarioError::BadValue`] for another division of the axes.
+    pub fn check_buses(&self) -> Result<(), ScenarioError> {
+        let refused = |need: String| ScenarioError::bad("can.buses", &format_args!("{:?}", self.buses), need);
+        if let Some(bus) = self.buses.iter().position(Vec::is_empty) {
+            return Err(refused(format!(
+                "bus {bus} has no drive, so no node would acknowledge the master's frames; remove this bus"
+            )));
+        }
+        let named = || self.buses.iter().flatten().copied();
+        let times = |axis: usize| named().filter(|&other| other == axis).count();
+        let unknown = named().find(|&axis| axis >= AXES);
+        match unknown.or_else(|| (0..AXES).find(|&axis| times(axis) != 1)) {
+            Some(axis) => Err(refused(format!(
+                "axis {axis} is named {}; name each of the axes 0 to {} ({}) once",
+                counted(times(axis) as u64, "time"),
+                AXES - 1,
+                AXIS_NAMES.join(" ")
+            ))),
+            None => Ok(()),
+        }
+    }
+
     pub(super) fn validate(&self) -> Checked {
         let need = "use at least 1 ms: a heartbeat shows that a node works";
         require(self.heartbeat_producer_ms > 0, "can.heartbeat_producer_ms", &0, need)?;
@@ -90,6 +115,7 @@ impl CanConfig {
             let need = format!("use 1 to 126, none twice; {MASTER_NODE} is the master");
             require(is_free, "can.node_ids", id, need)?;
         }
+        self.check_buses()?;
         let need = "leave it away with can.interfaces: it replaces their bit rate";
         require(self.is_virtual() || !self.ideal, "can.ideal", &true, need)?;
         self.bitrate().map_err(|error| ScenarioError::bad("can.bitrate_bps", &self.bitrate_bps, error))?;

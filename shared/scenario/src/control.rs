@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::{Checked, LONGEST_S, ranges_of, require};
 use super::{DrivesConfig, dynamics};
+use crate::wording::shortest;
 
 /// The controller extrapolates the motion by this time. SYNC takes one cycle, the drives' interpolation one, and
 /// smoothing in the drives some more.
@@ -107,7 +108,7 @@ impl ControllerConfig {
         require(
             self.integral_gain_per_s <= most_per_s,
             "controller.integral_gain_per_s",
-            &self.integral_gain_per_s,
+            &shortest(self.integral_gain_per_s),
             format_args!(
                 "use at most {most_per_s} (rate_hz / lead_cycles): with more, an error is corrected more than once before \
                  the first correction shows"

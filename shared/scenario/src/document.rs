@@ -131,6 +131,15 @@ fn unnamed(given: &Spanned<DeValue<'_>>, resolved: &Value) -> Option<(String, us
     }
 }
 
+/// The value of a text in TOML; `path` is for messages only.
+///
+/// # Errors
+/// [`ScenarioError::Malformed`] with file, line, column and key.
+pub fn parse_toml<T: DeserializeOwned>(path: &Path, text: &str) -> Result<T, ScenarioError> {
+    let document = Document::parse(path, text).map_err(|error| malformed::<T>(path, text, None, &error))?;
+    toml::from_str(text).map_err(|error| malformed::<T>(path, text, Some(&document), &error))
+}
+
 /// The refusal of a text that is no `T`. With a document the text is TOML, and the message names the key.
 pub(super) fn malformed<T: DeserializeOwned>(
     path: &Path,
@@ -152,8 +161,17 @@ pub(super) fn malformed<T: DeserializeOwned>(
         }
         Some(culprit.unwrap_or(key))
     });
-    if let Some(key) = key.filter(|_| !reason.starts_with(UNKNOWN_KEY)) {
-        reason = format!("{}: {reason}", excerpt(&key));
+    if let Some(key) = key {
+        match (reason.strip_prefix(UNKNOWN_KEY), document) {
+            // Serde reads some tables whole, and places their keys at the table.
+            (Some(unknown), Some(document)) => {
+                let unknown = unknown.split('\'').nth(1).unwrap_or_default();
+                let inner = document.place_of(&format!("{key}.{unknown}"), None);
+                place = if inner == document.place_of(&key, None) { place } else { inner };
+            }
+            (Some(_), None) => {}
+            (None, _) => reason = format!("{}: {reason}", excerpt(&key)),
+        }
     }
     ScenarioError::Malformed { place, reason }
 }
@@ -163,10 +181,58 @@ fn in_words(message: &str) -> String {
     let message = cut_quotations(message);
     let known = [("unknown field", UNKNOWN_KEY), ("unknown variant", "unknown value")];
     let known = known.iter().find_map(|(of_reader, ours)| Some((*ours, message.strip_prefix(of_reader)?)));
-    let Some((ours, rest)) = known else { return message.replace('`', "'") };
+    let Some((ours, rest)) = known else {
+        return of_type(&message).unwrap_or_else(|| message.replace('`', "'"));
+    };
     let mut names = rest.split('`').skip(1).step_by(2);
     let question = names.next().map_or_else(String::new, |unknown| question(unknown, names));
     format!("{ours}{}{question}", rest.replace('`', "'"))
+}
+
+/// A message of the TOML reader on a value of another type, or on an absent key, without the names of types in Rust.
+fn of_type(message: &str) -> Option<String> {
+    if let Some(key) = message.strip_prefix("missing field ") {
+        return Some(format!("the key {} is missing", key.replace('`', "'")));
+    }
+    let rest = ["invalid type: ", "invalid value: ", "invalid length "]
+        .iter()
+        .find_map(|beginning| message.strip_prefix(beginning))?;
+    let (given, expected) = rest.rsplit_once(", expected ")?;
+    let given = match given {
+        "map" => "a table".to_owned(),
+        "sequence" => "a list".to_owned(),
+        _ if given.starts_with('"') || given.starts_with("string ") => given.replacen("string ", "", 1),
+        _ if given.bytes().all(|byte| byte.is_ascii_digit()) => format!("a list of {given}"),
+        _ => given.split('`').nth(1)?.to_owned(),
+    };
+    Some(format!("{given} is {}", no_value_of(expected)?))
+}
+
+/// That something is no value of a type in Rust.
+fn no_value_of(expected: &str) -> Option<String> {
+    let whole = |least: i64, most: u64| format!("no whole number from {least} to {most}");
+    Some(match expected {
+        "u8" => whole(0, u8::MAX.into()),
+        "u16" => whole(0, u16::MAX.into()),
+        "u32" => whole(0, u32::MAX.into()),
+        "u64" | "usize" => whole(0, u64::MAX),
+        "i8" => whole(i8::MIN.into(), 127),
+        "i16" => whole(i16::MIN.into(), 32_767),
+        "i32" => whole(i32::MIN.into(), 2_147_483_647),
+        "i64" => "no whole number".to_owned(),
+        "f64" => "no number".to_owned(),
+        "a string" | "string" => "no text; write it in quotes".to_owned(),
+        "a boolean" => "neither true nor false".to_owned(),
+        "a sequence" => "no list; write it in brackets, and a list of tables as [[NAME]]".to_owned(),
+        "a map" => "no table".to_owned(),
+        _ if expected.starts_with("struct ") || expected.starts_with("internally tagged ") => {
+            "no table".to_owned()
+        }
+        _ => {
+            let length = expected.strip_prefix("an array of length ")?;
+            format!("no list of {}", length.split(' ').next()?)
+        }
+    })
 }
 
 /// A message of the TOML reader with every quotation cut.

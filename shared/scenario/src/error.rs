@@ -7,6 +7,7 @@ use masseter_model::{geometry::AXIS_NAMES, section::Range};
 use serde::Serialize;
 
 use crate::input::{excerpt, read_text};
+use crate::wording::shortest;
 
 /// Longest run, s.
 pub(super) const LONGEST_S: f64 = 86_400.0;
@@ -56,6 +57,16 @@ impl ScenarioError {
         Self::Malformed { place: path.display().to_string(), reason }
     }
 
+    /// The refusal of a file that a key of this scenario names.
+    pub(super) fn of_file_in(self, scenario: &Path, key: &str) -> Self {
+        match self {
+            Self::Unreadable { path, error } => {
+                Self::malformed_file(scenario, format!("{key}: {}: {error}", path.display()))
+            }
+            other => other,
+        }
+    }
+
     /// The refusal with the key in this table.
     pub(super) fn in_table(mut self, table: &str) -> Self {
         if let Self::BadValue { key, .. } = &mut self {
@@ -91,7 +102,7 @@ pub(super) fn require_range(key: &str, range: Range, number: f64) -> Checked {
     if range.contains(number) {
         return Ok(());
     }
-    Err(ScenarioError::bad(key, &number, format_args!("use {}", range.of_key(key))))
+    Err(ScenarioError::bad(key, &shortest(number), format_args!("use {}", range.of_key(key))))
 }
 
 /// Refuses a number out of the declared range of its key, in this table.

@@ -34,6 +34,7 @@ pub mod wording;
 
 pub use can::*;
 pub use control::*;
+pub use document::parse_toml;
 pub use drive_profile::*;
 pub use drives::*;
 pub use error::ScenarioError;

@@ -9,7 +9,7 @@ use serde::de::{Error, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 use crate::input::excerpt;
-use crate::wording::{listed, question};
+use crate::wording::{listed, question, shortest};
 
 /// The kind of a quantity. Values of different kinds cannot be compared.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -272,7 +272,7 @@ fn is_exponent(text: &str, place: usize) -> bool {
 
 impl Display for Quantity {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        write!(f, "{}", self.number)?;
+        f.write_str(&shortest(self.number))?;
         if self.unit.name.is_empty() { Ok(()) } else { write!(f, " {}", self.unit.name) }
     }
 }

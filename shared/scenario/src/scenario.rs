@@ -164,14 +164,15 @@ impl Scenario {
             let malformed = |reason| ScenarioError::malformed_file(path, reason);
             let (mut given, mut included) = (table_of(&text), Table::new());
             for file in &scenario.include {
-                let mut more = Self::read_included(&folder.join(file))?;
+                let mut more = Self::read_included(&folder.join(file))
+                    .map_err(|error| error.of_file_in(path, "include"))?;
                 append_lists(&mut given, &mut more);
                 merge(&mut included, more).map_err(malformed)?;
             }
             merge(&mut included, given).map_err(malformed)?;
             let robot = included.get("robot").and_then(toml::Value::as_str);
-            let mut whole =
-                robot.map_or_else(|| Ok(Table::new()), |robot| Self::read_robot(&folder.join(robot)))?;
+            let whole = robot.map_or_else(|| Ok(Table::new()), |robot| Self::read_robot(&folder.join(robot)));
+            let mut whole = whole.map_err(|error| error.of_file_in(path, "robot"))?;
             merge(&mut whole, included).map_err(malformed)?;
             scenario = Self::parse(path, &whole.to_string())?;
         }
@@ -179,7 +180,9 @@ impl Scenario {
             *memory = folder.join(&*memory);
         }
         scenario.files_mut().for_each(|(_, file)| *file = folder.join(&file));
-        scenario.drive_profile.iter_mut().try_for_each(|profile| profile.read_dcf(folder))?;
+        let mut profiles = scenario.drive_profile.iter_mut();
+        let read = profiles.try_for_each(|profile| profile.read_dcf(folder));
+        read.map_err(|error| error.of_file_in(path, "drive_profile.dcf"))?;
         Ok(scenario)
     }
 

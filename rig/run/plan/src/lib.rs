@@ -224,12 +224,15 @@ fn play_file(path: &Path, scenario: &mut Scenario) {
 /// The name of a run that plays a file.
 fn name_of_file(path: &Path) -> String {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(64).collect()
+    let name: String =
+        stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' }).take(64).collect();
+    // `.` and `..` are no names of files, and are refused as such.
+    if name.is_empty() { "motion".to_owned() } else { name }
 }
 
 /// The absolute path, for readers of the manifest in other folders.
 fn absolute(path: &Path) -> anyhow::Result<PathBuf> {
-    let absolute = path.canonicalize().with_context(|| format!("cannot read {}", path.display()))?;
+    let absolute = path.canonicalize().with_context(|| format!("cannot read '{}'", path.display()))?;
     // The manifest is written down with it.
     let is_text = absolute.to_str().is_some();
     ensure!(is_text, "{}: use folders and a file whose names are UTF-8", path.display());
@@ -239,6 +242,13 @@ fn absolute(path: &Path) -> anyhow::Result<PathBuf> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn any_path_gives_a_name() {
+        for (path, name) in [("a/jaw 1.csv", "jaw-1"), (".", "motion"), ("", "motion"), ("..", "motion")] {
+            assert_eq!(name_of_file(Path::new(path)), name, "{path}");
+        }
+    }
 
     #[test]
     fn a_dry_run_keeps_from_the_ends_and_is_entered_once() {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::ensure;
 use masseter_scenario::input::{read_bytes, read_text};
-use masseter_scenario::{FileConfig, Scenario, ScenarioError};
+use masseter_scenario::{FileConfig, Scenario, ScenarioError, parse_toml};
 use rand::{RngExt, SeedableRng, seq::SliceRandom};
 use rand_pcg::Pcg64;
 use serde::{Deserialize, Serialize};
@@ -78,10 +78,18 @@ pub struct CampaignFile {
 
 /// A file of a campaign that is refused.
 #[derive(Debug, thiserror::Error)]
-#[error("{}: {reason}", path.display())]
-pub struct FileError {
-    path: PathBuf,
-    reason: String,
+pub enum FileError {
+    /// The text is no file of a campaign.
+    #[error(transparent)]
+    Malformed(#[from] ScenarioError),
+    /// The file cannot be read, or its values do not belong together.
+    #[error("{}: {reason}", path.display())]
+    Refused {
+        /// The file.
+        path: PathBuf,
+        /// The reason and what to do.
+        reason: String,
+    },
 }
 
 impl CampaignFile {
@@ -90,18 +98,19 @@ impl CampaignFile {
     /// # Errors
     /// [`FileError`] with the place and what to do.
     pub fn read(path: &Path) -> Result<Self, FileError> {
-        Self::read_checked(path).map_err(|reason| FileError { path: path.to_owned(), reason })
+        let refused = |reason| FileError::Refused { path: path.to_owned(), reason };
+        let text = read_text(path, MOST_BYTES).map_err(|error| refused(error.to_string()))?;
+        parse_toml::<Self>(path, &text)?.checked(path).map_err(refused)
     }
 
-    fn read_checked(path: &Path) -> Result<Self, String> {
-        let text = read_text(path, MOST_BYTES).map_err(|error| error.to_string())?;
-        let mut file: Self = toml::from_str(&text).map_err(|error| error.to_string())?;
+    fn checked(mut self, path: &Path) -> Result<Self, String> {
+        let file = &mut self;
         file.check_numbers()?;
         file.factors.iter().try_for_each(Factor::validate)?;
         file.refuse_twins()?;
         let folder = path.parent().unwrap_or(Path::new(""));
-        file.scenario = file.scenario.map(|scenario| folder.join(scenario));
-        Ok(file)
+        file.scenario = file.scenario.take().map(|scenario| folder.join(scenario));
+        Ok(self)
     }
 
     /// The number of points.
@@ -411,6 +420,21 @@ mod tests {
         let refusal = campaign.case(&points, 0).scenario.unwrap_err();
         assert!(refusal.contains("rate_hz = 1"), "{refusal}");
         assert_ne!(campaign.case(&points, 0).id, campaign.case(&points, 1).id);
+    }
+
+    #[test]
+    fn a_file_that_is_no_campaign_is_refused_with_its_place_in_plain_words() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("c.toml");
+        for (text, expected) in [
+            ("a,b", "c.toml:1:2: "),
+            ("seed = 1\nruns = 'many'", "c.toml:2:8: runs: \"many\" is no whole number"),
+            ("run = 5", "c.toml:1:1: unknown key 'run'"),
+        ] {
+            std::fs::write(&path, text).unwrap();
+            let refusal = CampaignFile::read(&path).unwrap_err().to_string();
+            assert!(refusal.contains(expected) && !refusal.contains('\n'), "{refusal}");
+        }
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use masseter_scenario::input::{excerpt, is_printable};
-use masseter_scenario::wording::question;
+use masseter_scenario::wording::{question, shortest};
 use serde::{Deserialize, Serialize};
 
 use crate::messages::MOST_VALUES;
@@ -145,7 +145,10 @@ pub enum NameError {
     )]
     BadRange(String),
     /// The value is beyond the parameter's range.
-    #[error("parameter '{name}' cannot be {value}: its range is {least} to {most} {unit}")]
+    #[error(
+        "parameter '{name}' cannot be {}: its range is {} to {} {unit}",
+        shortest(*.value), shortest(*.least), shortest(*.most)
+    )]
     OutOfRange {
         /// The parameter.
         name: String,

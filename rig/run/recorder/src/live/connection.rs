@@ -3,6 +3,7 @@
 use std::{io::ErrorKind, net::TcpStream, sync::Arc, time::Duration};
 
 use masseter_recording::{Recorded, Scene, Topic};
+use masseter_runtime::clock::{self, SECOND_NS};
 use masseter_runtime::{named::Declared, transport::Domain};
 use rustix::process::{Pid, Signal, getppid, kill_process};
 use tungstenite::Error;
@@ -14,6 +15,8 @@ pub(super) const QUEUE: usize = 8192;
 /// Time that the thread waits for a request before it sends the queue.
 pub(super) const INTERVAL: Duration = Duration::from_millis(10);
 
+/// Time for the answer to a close frame, ns.
+const CLOSE_NS: u64 = 2 * SECOND_NS;
 /// The longest message from a client, bytes; clients only ask.
 const MAX_REQUEST_BYTES: usize = 1 << 16;
 
@@ -82,13 +85,16 @@ impl Socket {
         Ok(self.0.flush()?)
     }
 
-    /// Sends a close frame behind everything else. A client that answers the frame has read everything.
+    /// Sends a close frame behind everything else. A client that answers the frame has read everything; one that does not
+    /// answer in time keeps no place.
     pub(super) fn close_after_all(&mut self) -> Result<(), Disconnected> {
         let frame = CloseFrame { code: CloseCode::Away, reason: "the run is over".into() };
         self.0.close(Some(frame))?;
-        loop {
+        let by_ns = clock::now_ns() + CLOSE_NS;
+        while clock::now_ns() < by_ns {
             self.receive()?;
         }
+        Err(Disconnected)
     }
 }
 

@@ -169,6 +169,15 @@ fn one_client_more_than_there_is_room_for_is_told_so() {
     assert!(answer_to(&server, &path, "Host: 127.0.0.1\r\n").starts_with("HTTP/1.1 503"));
 }
 
+#[test]
+fn a_client_that_never_answers_the_close_keeps_no_place() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let _client = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
+    let (stream, _) = listener.accept().unwrap();
+    stream.set_read_timeout(Some(INTERVAL)).unwrap();
+    assert!(Socket::new(stream, Vec::new()).close_after_all().is_err());
+}
+
 /// Whether the condition comes true within a generous time.
 fn comes_true(is_so: impl Fn() -> bool) -> bool {
     (0..10_000).any(|_| {
