@@ -412,3 +412,23 @@ fn a_program_that_declares_what_cannot_be_shown_is_refused_and_the_next_one_take
     assert!(said.matches("refused").count() < 8, "{said}");
     assert!(!said.contains(['\u{1b}', '\u{7}']) && said.len() < 8000, "{said}");
 }
+
+/// Neither an FMU nor the Python package of the rig is there.
+#[test]
+fn an_fmu_that_cannot_be_played_leads_to_its_document() {
+    let workspace = Workspace::new(SCENARIO);
+    let fmu = workspace.write("law.fmu", "no FMU");
+    let out = workspace.run_folder();
+    let controller = format!("fmu:{}", fmu.display());
+    let output = masseter(&[
+        "run",
+        "--clock",
+        "lockstep",
+        "--controller",
+        &controller,
+        "--out",
+        out.to_str().unwrap(),
+    ]);
+    assert_eq!(output.status.code(), Some(4));
+    assert!(stderr(&output).contains("docs/fmu.md"), "{}", stderr(&output));
+}

@@ -1,6 +1,10 @@
 //! The start of a run: what keeps the drives off, and the dry run, as a user sees them.
 
-use crate::common::{Workspace, stderr, stdout};
+use std::process::Command;
+
+use rustix::process::{Pid, Signal, kill_process};
+
+use crate::common::{MASSETER, Workspace, ended, masseter, stderr, stdout, wait_until_it_records};
 
 /// Runs the scenario under virtual time; the exit code and the output.
 fn run(scenario: &str, arguments: &[&str]) -> (Option<i32>, String) {
@@ -83,4 +87,45 @@ fn a_dry_run_predicts_the_demands_at_full_speed() {
     let text = stdout(&output);
     assert_eq!(output.status.code(), Some(0), "{text}{}", stderr(&output));
     assert_says(&text, &["20.0 s of motion", "at full speed, predicted from this run at 10 %", "TPDO1 here"]);
+}
+
+#[test]
+fn a_run_that_goes_on_has_no_verdict_yet() {
+    let workspace = Workspace::new("");
+    let rig = workspace.start_lockstep(&["--duration", "120"]);
+    wait_until_it_records(&workspace);
+    let run = workspace.run_folder();
+    let refused = masseter(&["report", run.to_str().unwrap()]);
+    assert_eq!(refused.status.code(), Some(2), "{}", stderr(&refused));
+    assert!(stderr(&refused).contains("goes on and has no verdict yet"), "{}", stderr(&refused));
+    assert!(!run.join("summary.json").exists());
+    kill_process(Pid::from_child(&rig), Signal::INT).unwrap();
+    ended(rig, 130);
+    assert_eq!(masseter(&["report", run.to_str().unwrap()]).status.code(), Some(130));
+}
+
+#[test]
+fn a_path_through_a_file_is_named_as_such() {
+    let workspace = Workspace::new("");
+    let out = workspace.write("plain.txt", "").join("run");
+    let refused = masseter(&["run", "--clock", "virtual", "--out", out.to_str().unwrap()]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(stderr(&refused).contains("plain.txt is no folder"), "{}", stderr(&refused));
+}
+
+#[test]
+fn too_few_open_files_are_refused_before_the_start() {
+    let workspace = Workspace::new("");
+    let refused = Command::new("sh")
+        .args(["-c", "ulimit -n 60; exec \"$0\" run --clock lockstep --out \"$1\"", MASSETER])
+        .arg(workspace.run_folder())
+        .output()
+        .unwrap();
+    assert_eq!(refused.status.code(), Some(2), "{}", stderr(&refused));
+    assert!(
+        stderr(&refused).contains("a process may open 60 files, and a run needs 128"),
+        "{}",
+        stderr(&refused)
+    );
+    assert!(!workspace.run_folder().exists());
 }

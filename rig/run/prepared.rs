@@ -22,6 +22,8 @@ pub(crate) struct PreparedRun {
     folder: RunFolder,
     manifest: Manifest,
     reserve: Reserve,
+    /// Until the run is reported.
+    occupied: Option<std::fs::File>,
 }
 
 /// A run that has ended.
@@ -31,6 +33,8 @@ pub(crate) struct PlayedRun {
     manifest: Manifest,
     /// The summary's room on the disk.
     reserved: std::fs::File,
+    /// Until the run is reported.
+    occupied: Option<std::fs::File>,
     /// For those who watched.
     report_server: Option<masseter_recorder::live::ReportServer>,
     /// Whether the manifest was written.
@@ -40,13 +44,15 @@ pub(crate) struct PlayedRun {
 impl PreparedRun {
     /// Refuses a run that cannot start, and makes the folder of one that can.
     pub(crate) fn new(request: &RunRequest) -> Result<Self, Failure> {
-        room::check_memory().usage()?;
+        room::check_limits().usage()?;
         let (plan, request) = resolve(request).usage()?;
         let (controller, motion_s) = (request.controller.name(), plan.trajectory.duration_s());
         let (scenario, is_waived) = (&plan.scenario, request.without_bring_up);
         let played = Played { scenario, controller: controller.as_deref(), motion_s, is_waived };
         played.check_bring_up().usage()?;
-        room::check_disk(request.out.as_deref().unwrap_or(RUNS.as_ref()), &plan).incomplete()?;
+        let out = std::path::absolute(request.out.as_deref().unwrap_or(RUNS.as_ref()));
+        let out = out.context("the current folder does not exist any more: change to another one").usage()?;
+        room::check_disk(&out, &plan).incomplete()?;
         let domain = match request.clock {
             ClockKind::Virtual => None,
             ClockKind::Auto | ClockKind::Rt | ClockKind::Lockstep => {
@@ -61,6 +67,7 @@ impl PreparedRun {
             None => RunFolder::create_in(RUNS.as_ref(), &plan.scenario.name).usage()?,
         };
         keep_scenario(&folder, &plan.scenario).incomplete()?;
+        let occupied = folder.occupy();
         if !request.quiet {
             status!("{}", plan.announcement());
         }
@@ -69,12 +76,12 @@ impl PreparedRun {
         write_manifest(&folder, &manifest)?;
         let no_room = || format!("no room in {} for the verdict", folder.path().display());
         let reserve = Reserve::allocate_in(folder.path()).with_context(no_room).incomplete()?;
-        Ok(Self { plan, request, domain, folder, manifest, reserve })
+        Ok(Self { plan, request, domain, folder, manifest, reserve, occupied })
     }
 
     /// Plays the motion to its end.
     pub(crate) fn play(self, interrupts: &Interrupts) -> Result<PlayedRun, Failure> {
-        let Self { plan, request, domain, folder, mut manifest, reserve } = self;
+        let Self { plan, request, domain, folder, mut manifest, reserve, occupied } = self;
         let ran = match domain {
             None => {
                 let build = request.controller.builder().expect("the clock is checked");
@@ -90,7 +97,8 @@ impl PreparedRun {
         drop(reserve.manifest);
         let written = write_manifest(&folder, &manifest);
         let report_server = ran?;
-        Ok(PlayedRun { request, folder, manifest, reserved: reserve.summary, report_server, written })
+        let reserved = reserve.summary;
+        Ok(PlayedRun { request, folder, manifest, reserved, occupied, report_server, written })
     }
 }
 
@@ -102,10 +110,11 @@ impl PlayedRun {
             status!("masseter: interrupted before the first cycle: nothing is recorded in {folder}");
             return Ok(Exit::Interrupted);
         }
-        let Self { request, folder, manifest, reserved, report_server, written } = self;
+        let Self { request, folder, manifest, reserved, occupied, report_server, written } = self;
         let detail = if request.verbose { Detail::Whole } else { Detail::Brief };
         let shown = Some((request.format, detail));
         let exit = masseter_report::report_run(&folder, &manifest, shown, reserved)?.exit_code;
+        drop(occupied);
         if let Some(server) = report_server
             && let Ok(html) = read_text(&folder.file("report.html"), MOST_KEPT_BYTES)
         {

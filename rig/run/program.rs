@@ -17,6 +17,7 @@ use rustix::process::{
 
 use super::child::{KILLED, POLL, READY_TIMEOUT, Readiness, Ready, Reports, describe, open_handle};
 use super::reception::Reception;
+use super::request::is_fmu_player;
 use crate::prelude::*;
 
 /// The hidden verb that ties a process to the supervisor before it becomes the program.
@@ -33,6 +34,8 @@ pub(super) struct Program {
 
 struct Executable {
     path: PathBuf,
+    /// What it needs, for one that ends before it is ready.
+    guide: &'static str,
     child: Child,
     status: Option<ExitStatus>,
 }
@@ -105,7 +108,12 @@ impl Program {
                     .spawn()
             })
             .with_context(|| format!("the controller {} cannot be started", path.display()))?;
-        program.executable = Some(Executable { path: path.to_owned(), child, status: None });
+        let guide = if is_fmu_player(arguments) {
+            "docs/fmu.md for the Python package that plays an FMU"
+        } else {
+            "docs/interface.md for how a controller attaches"
+        };
+        program.executable = Some(Executable { path: path.to_owned(), guide, child, status: None });
         Ok(program)
     }
 
@@ -197,9 +205,9 @@ impl Program {
         let path = executable.path.display();
         if let Some(status) = status {
             bail!(
-                "the controller {path} ended ({}) before it was ready; see its message above, and docs/interface.md for \
-                 how a controller attaches",
-                describe(status)
+                "the controller {path} ended ({}) before it was ready; see its message above, and {}",
+                describe(status),
+                executable.guide
             );
         }
         if !is_in_time {

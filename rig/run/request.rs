@@ -140,7 +140,7 @@ impl RunRequest {
         scenario.can.reset_faults |= self.reset_faults;
         if let Some(wait) = self.wait_ready {
             scenario.can.ready_timeout_ms =
-                u32::try_from(wait.as_millis()).context("--wait-ready: use at most 49 days")?;
+                u32::try_from(wait.as_millis()).ok().context("--wait-ready: use at most 49 days")?;
         }
         scenario.rate_hz = self.rate_hz.unwrap_or(scenario.rate_hz);
         scenario.seed = self.seed.unwrap_or(scenario.seed);
@@ -209,6 +209,11 @@ pub(crate) enum ControllerChoice {
     Executable(PathBuf, Vec<String>),
     /// Nobody, or whoever publishes commands: the rig starts, invites and watches no controller.
     None,
+}
+
+/// Whether these arguments of Python play an FMU.
+pub(super) fn is_fmu_player(arguments: &[String]) -> bool {
+    arguments.starts_with(&FMU_PLAYER.map(str::to_owned))
 }
 
 impl Default for ControllerChoice {
@@ -290,9 +295,7 @@ impl ControllerChoice {
     pub(crate) fn with_map(self, map: Option<&String>) -> anyhow::Result<Self> {
         let Some(map) = map else { return Ok(self) };
         match self {
-            Self::Executable(program, mut arguments)
-                if arguments.starts_with(&FMU_PLAYER.map(str::to_owned)) =>
-            {
+            Self::Executable(program, mut arguments) if is_fmu_player(&arguments) => {
                 arguments.push(map.clone());
                 Ok(Self::Executable(program, arguments))
             }

@@ -20,8 +20,16 @@ const AROUND_MOTION_S: f64 = 5.0;
 const LEAST_MEMORY: [(Resource, &str, &str, u64); 2] =
     [(Resource::As, "address space", "v", 200_000_000), (Resource::Data, "data", "d", 120_000_000)];
 
-/// Refuses limits on memory under which a process would die of its next allocation.
-pub(super) fn check_memory() -> anyhow::Result<()> {
+/// The least number of open files of a process: the recorder of a run with eight live clients has 74.
+const LEAST_FILES: u64 = 128;
+
+/// Refuses limits under which a process would die of its next allocation, or of its next file.
+pub(super) fn check_limits() -> anyhow::Result<()> {
+    let files = getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX);
+    ensure!(
+        files >= LEAST_FILES,
+        "a process may open {files} files, and a run needs {LEAST_FILES}: raise the limit ('ulimit -n 1024')"
+    );
     for (resource, name, option, least) in LEAST_MEMORY {
         let limit = getrlimit(resource).current.unwrap_or(u64::MAX);
         ensure!(
@@ -34,7 +42,7 @@ pub(super) fn check_memory() -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Refuses a run whose files have no room in the folder `path`, which need not exist yet.
+/// Refuses a run whose files have no room in the folder of this absolute path, which need not exist yet.
 pub(super) fn check_disk(path: &Path, plan: &masseter_plan::RunPlan) -> anyhow::Result<()> {
     let run_s = plan.trajectory.duration_s() + AROUND_MOTION_S;
     let needed = (run_s * f64::from(plan.scenario.rate_hz) * CYCLE_BYTES + REPORT_BYTES) as u64;
@@ -46,8 +54,7 @@ pub(super) fn check_disk(path: &Path, plan: &masseter_plan::RunPlan) -> anyhow::
         megabytes(largest),
         megabytes(needed)
     );
-    let absolute = std::path::absolute(path)?;
-    let existing = absolute.ancestors().find(|folder| folder.is_dir()).unwrap_or(&absolute);
+    let existing = path.ancestors().find(|folder| folder.is_dir()).unwrap_or(path);
     let free = free_bytes(existing)?;
     ensure!(
         free >= needed,
@@ -63,6 +70,7 @@ pub(super) fn check_disk(path: &Path, plan: &masseter_plan::RunPlan) -> anyhow::
 /// Refuses a rig whose topics have no room in shared memory: the kernel ends a process that touches a page for which
 /// there is none.
 pub(super) fn check_shared_memory() -> anyhow::Result<()> {
+    require_writable(SHARED_MEMORY.as_ref())?;
     let free = free_bytes(SHARED_MEMORY.as_ref())?;
     ensure!(
         free >= SHARED_BYTES,
@@ -72,6 +80,14 @@ pub(super) fn check_shared_memory() -> anyhow::Result<()> {
         more_shared_memory()
     );
     Ok(())
+}
+
+fn require_writable(folder: &Path) -> anyhow::Result<()> {
+    let unwritable = || {
+        let folder = folder.display();
+        format!("{folder} takes no files, and a rig needs it for its messages; --clock virtual needs none")
+    };
+    tempfile::tempfile_in(folder).map(drop).with_context(unwritable)
 }
 
 /// Gives every page of the domain's shared memory its place, once all processes have opened their ports.
@@ -148,6 +164,16 @@ mod tests {
         let failure = reserve_shared_memory(&domain).usage().unwrap_err();
         assert_eq!(failure.exit, Exit::Usage);
         assert!(failure.error.to_string().contains("--shm-size=69m"), "{}", failure.error);
+    }
+
+    #[test]
+    fn shared_memory_that_takes_no_files_is_named() {
+        require_writable(SHARED_MEMORY.as_ref()).unwrap();
+        let refusal = require_writable("/proc".as_ref()).unwrap_err().to_string();
+        assert!(
+            refusal.starts_with("/proc takes no files") && refusal.contains("--clock virtual"),
+            "{refusal}"
+        );
     }
 
     #[test]

@@ -300,12 +300,12 @@ fn read_log(path: &Path, new: &StormLog) -> anyhow::Result<StormLog> {
 pub(crate) fn in_words(log: &StormLog) -> String {
     use std::fmt::Write;
     let StormLog { seed, next, played, took_s, verdicts, violations, .. } = log;
-    let words: Vec<_> = verdicts.iter().map(|(word, count)| format!("{count} {word}")).collect();
     let an_hour = *played as f64 / took_s.max(f64::MIN_POSITIVE) * 3600.0;
-    let mut text = format!(
-        "{played} storms of seed {seed} in {took_s:.0} s ({an_hour:.0} an hour): {}; the next is {next}\n",
-        words.join(", ")
-    );
+    let mut text = format!("{played} storms of seed {seed} in {took_s:.0} s ({an_hour:.0} an hour)");
+    for (word, count) in verdicts {
+        let _ = write!(text, ", {count} {word}");
+    }
+    let _ = writeln!(text, "; the next is {next}");
     for Violation { number, broken, again, smallest, .. } in violations {
         let _ = writeln!(text, "storm {number} breaks a law; {broken}\n  again: {again}");
         if let Some(smallest) = smallest {

@@ -293,7 +293,10 @@ impl Scenario {
     /// [`ScenarioError::Malformed`] for an unknown key or a value of another type.
     pub fn with(&self, assignment: &str) -> Result<Self, ScenarioError> {
         let refused = |reason| ScenarioError::Malformed { place: excerpt(assignment), reason };
-        let (key, value) = assignment.split_once('=').ok_or_else(|| refused("write KEY=VALUE".to_owned()))?;
+        let (key, value) = assignment
+            .split_once('=')
+            .filter(|(key, _)| !key.trim().is_empty())
+            .ok_or_else(|| refused("write KEY=VALUE".to_owned()))?;
         if !key.contains('.') && !Self::is_key(key.trim()) {
             return self.with(&format!("parameters.{assignment}"));
         }

@@ -1,7 +1,7 @@
 //! The folder of a run and the names of its files. Also new files and folders for the output of a command, which
 //! creates them before it computes. Existing ones are never overwritten.
 
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::io::{self, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 use std::{os::unix::fs::symlink, time::UNIX_EPOCH};
@@ -146,6 +146,18 @@ impl RunFolder {
         write_whole(path, content)
     }
 
+    /// Shows others that its run goes on, until the file is dropped or the process has died. None where the file system
+    /// has no locks.
+    pub fn occupy(&self) -> Option<File> {
+        File::open(self.scenario()).ok().filter(|file| file.try_lock().is_ok())
+    }
+
+    /// Whether its run goes on.
+    pub fn is_occupied(&self) -> bool {
+        let scenario = File::open(self.scenario());
+        scenario.is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)))
+    }
+
     /// The folder itself.
     pub fn path(&self) -> &Path {
         &self.0
@@ -204,6 +216,9 @@ pub enum OutputError {
     /// It exists.
     #[error("{} exists and is not overwritten; choose another --out", .0.display())]
     Exists(PathBuf),
+    /// The path leads through a file.
+    #[error("{} is no folder; choose another --out", .0.display())]
+    NoFolder(PathBuf),
     /// The system refused to create it.
     #[error("cannot create {}: {error}", path.display())]
     Create {
@@ -239,7 +254,10 @@ pub fn new_file(path: &Path) -> Result<File, OutputError> {
 /// When it exists, or the system refuses it.
 pub fn new_folder(path: &Path) -> Result<(), OutputError> {
     if let Some(parent) = path.parent() {
-        fs::create_dir_all(parent).map_err(|error| OutputError::Create { path: path.to_owned(), error })?;
+        fs::create_dir_all(parent).map_err(|error| match error.kind() {
+            ErrorKind::AlreadyExists => OutputError::NoFolder(parent.to_owned()),
+            _ => OutputError::Create { path: path.to_owned(), error },
+        })?;
     }
     fs::create_dir(path).map_err(OutputError::creating(path))
 }

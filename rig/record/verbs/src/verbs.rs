@@ -10,7 +10,7 @@ use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
-use masseter_recording::{Reader, new_file, recording_at, recover, thin};
+use masseter_recording::{Reader, new_file, new_folder, recording_at, recover, thin};
 use masseter_scenario::wording::counted;
 use masseter_terminal::{Exit, result, result_with_tones};
 use mcap::Attachment;
@@ -143,7 +143,7 @@ fn write_attached<'a>(
         let is_plain = Path::new(name).file_name() == Some(std::ffi::OsStr::new(name));
         ensure!(is_plain, "a file is attached as '{name}', which is not the plain name of a file");
     }
-    fs::create_dir(folder).with_context(|| format!("cannot create {}", folder.display()))?;
+    new_folder(folder)?;
     let write = |file: &'a Attachment<'static>| {
         let path = folder.join(&file.name);
         let written = File::create_new(&path).and_then(|mut created| created.write_all(&file.data));

@@ -72,6 +72,7 @@ pub fn report_run(
 /// With [`Exit::Usage`] when the folder holds no readable run, with [`Exit::Incomplete`] when a file cannot be written.
 pub fn report_past_run(path: &Path, set: &[String], format: Format) -> Result<Exit, Failure> {
     let folder = RunFolder::open(path).usage()?;
+    refuse_running(&folder).usage()?;
     let unread = || format!("cannot read {}", folder.manifest().display());
     let mut manifest = manifest_of(&folder).with_context(unread).usage()?;
     choose_cycles(&mut manifest.scenario, set).usage()?;
@@ -86,6 +87,13 @@ pub fn report_past_run(path: &Path, set: &[String], format: Format) -> Result<Ex
         written => written.incomplete()?,
     }
     Ok(verdict.exit_code)
+}
+
+/// Refuses a run that goes on: its manifest says until the end that the supervisor has died.
+fn refuse_running(folder: &RunFolder) -> anyhow::Result<()> {
+    let path = folder.path().display();
+    ensure!(!folder.is_occupied(), "the run {path} goes on and has no verdict yet: wait for its end");
+    Ok(())
 }
 
 /// Writes the page of a failed run again, with until when the run could pass; returns its place.
