@@ -32,9 +32,12 @@ pub enum FolderError {
     /// It holds files, but no campaign.
     #[error("{} exists and is no folder of a campaign; choose another --out", .0.display())]
     NoCampaign(PathBuf),
+    /// Its plan has been damaged, for this reason.
+    #[error("{}: it is no plan: {}; choose another --out", .0.display(), .1)]
+    DamagedPlan(PathBuf, serde_json::Error),
     /// A file in it has been damaged, for this reason.
-    #[error("{}: {}; remove its folder, and the rest goes on", .0.display(), .1)]
-    Damaged(PathBuf, String),
+    #[error("{}: it is no result: {}; remove its folder, and the rest goes on", .0.display(), .1)]
+    Damaged(PathBuf, serde_json::Error),
     /// The system refuses an operation on a file or folder in it.
     #[error("{}: {}", .0.display(), .1)]
     System(PathBuf, io::Error),
@@ -148,7 +151,7 @@ impl CampaignFolder {
     }
 
     fn read_plan(&self) -> Result<Campaign, FolderError> {
-        read_json(&self.plan_path(), "plan")
+        read_json(&self.plan_path(), FolderError::DamagedPlan)
     }
 
     fn plan_path(&self) -> PathBuf {
@@ -220,13 +223,15 @@ fn lock(folder: &Path) -> Result<File, FolderError> {
 }
 
 fn read_result(path: &Path) -> Result<CaseResult, FolderError> {
-    read_json(path, "result")
+    read_json(path, FolderError::Damaged)
 }
 
-fn read_json<T: serde::de::DeserializeOwned>(path: &Path, what: &str) -> Result<T, FolderError> {
+fn read_json<T: serde::de::DeserializeOwned>(
+    path: &Path,
+    damaged: impl FnOnce(PathBuf, serde_json::Error) -> FolderError,
+) -> Result<T, FolderError> {
     let text = read_text(path, MOST_KEPT_BYTES).map_err(system(path))?;
-    serde_json::from_str(&text)
-        .map_err(|error| FolderError::Damaged(path.to_owned(), format!("it is no {what}: {error}")))
+    serde_json::from_str(&text).map_err(|error| damaged(path.to_owned(), error))
 }
 
 fn system(path: &Path) -> impl FnOnce(io::Error) -> FolderError {
@@ -358,5 +363,9 @@ mod tests {
         fs::write(kept.join(RESULT), "{").unwrap();
         let refusal = results(&folder).unwrap_err().to_string();
         assert!(refusal.contains("remove its folder, and the rest goes on"), "{refusal}");
+        fs::write(folder.plan_path(), "{").unwrap();
+        let refusal = folder.read_plan().unwrap_err().to_string();
+        // Its folder has the results of all other cases.
+        assert!(refusal.contains("choose another --out") && !refusal.contains("remove"), "{refusal}");
     }
 }
