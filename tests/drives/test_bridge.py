@@ -74,6 +74,8 @@ def socketcand_server() -> Iterator[dict[str, Any]]:
             assert server.stderr is not None
             ports = (re.search(r"socketcand protocol on .*:(\d+);", line) for line in server.stderr)
             port = next(filter(None, ports))[1]
+            # A full pipe would hold the server up.
+            threading.Thread(target=server.stderr.read, daemon=True).start()
             yield {"interface": "socketcand", "host": "127.0.0.1", "port": int(port), "channel": "can0"}
         finally:
             server.kill()
@@ -178,14 +180,21 @@ def test_a_bus_that_takes_no_frame_does_not_hold_up_the_end(drives: Maker) -> No
 
 
 def test_an_error_of_the_other_bus_reaches_the_user_with_its_cause(drives: Maker, caplog: pytest.LogCaptureFixture) -> None:
-    bus = drives(nodes=[1])
+    bus = drives("failed", nodes=[1])
+    before = set(threading.enumerate())
     with virtual("fails") as wire:
         bus.serve(wire)
         heard(bus, 0x701)
+        ways = set(threading.enumerate()) - before
     with pytest.raises(BridgeError, match="closed bus") as failure:
         heard(bus, 0x000)
     assert isinstance(failure.value.__cause__, can.CanOperationError)
     assert "bridge to Virtual bus channel fails ended" in caplog.text
+    for way in ways:
+        way.join(30)
+    with ExitStack() as others:
+        for _ in range(7):
+            others.enter_context(Drives("failed"))
 
 
 def test_a_lost_server_is_an_error_at_the_next_frame_of_a_drive(drives: Maker) -> None:

@@ -25,6 +25,8 @@ class Bridge:
         self._about = f"{own.channel_info}, bridge to {other.channel_info}"
         self._is_open = True
         self._error: Exception | None = None
+        #: Taken by the thread that ends first.
+        self._ended = threading.Semaphore(1)
         _joined.add(other)
         ways = [(own, other), (other, own)]
         self._threads = [threading.Thread(target=self._carry, args=way, name=self._about, daemon=True) for way in ways]
@@ -50,6 +52,14 @@ class Bridge:
                 self._is_open = False
                 _LOG.error("%s ended: %s", self._about, error)
                 self._error = error
+        finally:
+            # The second thread that ends frees the place on the wire: nobody receives there any more.
+            if not self._ended.acquire(blocking=False):
+                self._leave()
+
+    def _leave(self) -> None:
+        _joined.discard(self._other)
+        self._own.shutdown()
 
     def check(self) -> None:
         """Raises the error that has ended the bridge."""
@@ -61,5 +71,4 @@ class Bridge:
         self._is_open = False
         for thread in self._threads:
             thread.join(2 * _ROOM_S)
-        _joined.discard(self._other)
-        self._own.shutdown()
+        self._leave()
