@@ -5,6 +5,7 @@ use std::fmt::{self, Display, Formatter};
 use masseter_can::canopen::{EmergencyCode, ObjectAddress};
 use masseter_can::cia402::{DriveState, StatuswordError};
 use masseter_model::geometry::AXIS_NAMES;
+use masseter_scenario::wording::shortest;
 
 use super::line_error::{LineError, OtherMaster, Restarted};
 
@@ -332,7 +333,7 @@ pub enum AxisError {
         index: u16,
     },
     /// A way that this step does not allow.
-    #[error("{:.3} mm is no way for a jog; give up to {:.0} mm, at least ten increments", .by_m * 1e3, .most_m * 1e3)]
+    #[error("{} mm is no way for a jog; give up to {:.0} mm, at least ten increments", shortest(.by_m * 1e3), .most_m * 1e3)]
     Way {
         /// The way, m.
         by_m: f64,

@@ -198,9 +198,11 @@ fn the_drive_stops_by_itself_without_the_heartbeat() {
 #[test]
 fn ways_beyond_a_jog_are_refused_before_anything_is_sent() {
     let mut bench = Bench::new("");
-    for by_m in [0.0, 0.021, f64::NAN] {
+    for by_m in [0.0, 0.021, 1e-12, 1e300, f64::NAN] {
         let error = bench.jog(by_m).unwrap_err();
         assert!(matches!(error, MotionError::OfAxis { reason: AxisError::Way { .. }, .. }), "{error}");
+        // A tiny and a huge way are written with an exponent.
+        assert!(error.to_string().len() < 100, "{error}");
     }
     assert!(bench.log.controlwords().is_empty());
 }
