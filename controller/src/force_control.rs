@@ -185,6 +185,10 @@ impl PoseLaw for ForceControl {
             signal("force_stiffness_n_per_m", "N/m", "Stiffness that the bite has shown so far."),
             signal("force_phase", "", "0: position control; 1: force control; 2: opening; 3: food broke."),
         ];
+        if self.bite.config.probe.is_some() {
+            let about = "Stiffness that a probe has shown; 0 before.";
+            signals.push(signal("probed_stiffness_n_per_m", "N/m", about));
+        }
         if self.bite.config.lateral.is_some() {
             signals.extend([
                 signal(
@@ -213,10 +217,11 @@ impl PoseLaw for ForceControl {
         };
         let [offset_m, lateral_n] = [self.offsets_m[0], self.desired_lateral_n().push(0.0)];
         let vertical = [self.bite.desired_n, offset_m.z, self.bite.stiffness.n_per_m, phase];
+        let probed = self.bite.config.probe.map(|_| self.bite.stiffness.probed_n_per_m());
         let lateral = [lateral_n.x, lateral_n.y, offset_m.x, offset_m.y];
         signals
             .iter_mut()
-            .zip(vertical.into_iter().chain(lateral))
+            .zip(vertical.into_iter().chain(probed).chain(lateral))
             .for_each(|(signal, value)| *signal = value);
     }
 

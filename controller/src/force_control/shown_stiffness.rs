@@ -76,6 +76,11 @@ impl ShownStiffness {
         self.probed_n_per_m > 0.0
     }
 
+    /// What a probe has shown, N/m; 0 before.
+    pub(super) fn probed_n_per_m(&self) -> f64 {
+        self.probed_n_per_m
+    }
+
     /// Another bite begins. What a probe has shown stays known.
     pub(super) fn forget(&mut self) {
         self.n_per_m = self.probed_n_per_m;
