@@ -44,6 +44,11 @@ impl Finding {
         }
     }
 
+    /// What passes, but for triggers that no sample shows, is untested; the machine may have lost the samples.
+    pub(super) fn with_unseen(self, triggers: u64) -> Self {
+        if triggers > 0 && self.result == CheckResult::Passed { self.into_untested() } else { self }
+    }
+
     /// A window that the run's end cut, in words. One that must be whole leaves what passes untested.
     pub(super) fn with_cut(self, part: Option<String>, is_whole: bool) -> Self {
         let Some(part) = part else { return self };

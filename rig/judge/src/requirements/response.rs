@@ -47,8 +47,10 @@ pub(super) struct Response {
     /// The shortest observation of an answer that the run's end cut, ns.
     cut_ns: Option<u64>,
     last_ns: u64,
-    /// Triggers without a sample within their time, as at the end of the run.
+    /// Triggers at the end of the run, without a sample within their time.
     beyond: u64,
+    /// Triggers between two samples, of which none lies within their time.
+    unseen: u64,
 }
 
 /// The answer to a trigger so far.
@@ -112,6 +114,7 @@ impl Response {
             cut_ns: None,
             last_ns: 0,
             beyond: 0,
+            unseen: 0,
         })
     }
 
@@ -227,7 +230,10 @@ impl Response {
 
     fn close_answer(&mut self, answer: Answer) {
         if !answer.is_judged {
-            self.beyond += 1;
+            let due_ns = self.within_ns.map(|within_ns| answer.at_ns.saturating_add(within_ns));
+            let is_between = due_ns.is_some_and(|due_ns| due_ns < self.last_ns);
+            let count = if is_between { &mut self.unseen } else { &mut self.beyond };
+            *count += 1;
             return;
         }
         self.answered += u64::from(answer.best >= 0.0);
@@ -280,7 +286,8 @@ impl Response {
             let within_s = self.within_ns.map(|ns| ns as f64 / SECOND_NS as f64);
             if is_numeric { self.then.share(margin) } else { Finding::share(margin, within_s?) }
         });
-        let finding = Finding::new(self.answered == self.triggers - self.beyond, self.in_words(), unit);
+        let judged = self.triggers - self.beyond - self.unseen;
+        let finding = Finding::new(self.answered == judged, self.in_words(), unit).with_unseen(self.unseen);
         let (worst_ns, latency_s) = (Some(worst.at_ns), self.longest_s);
         let ms = |ns: u64| ns as f64 / 1e6;
         let cut = self.cut_ns.map(|observed_ns| {
@@ -317,11 +324,18 @@ impl Response {
             0 => String::new(),
             more => format!("; {} without a sample within its time not judged", counted(more, "trigger")),
         };
+        let unseen = match self.unseen {
+            0 => String::new(),
+            more => format!(
+                "; {} between two samples not judged: make within longer than a cycle",
+                counted(more, "trigger")
+            ),
+        };
         let cut = match self.not_followed {
             0 => String::new(),
             more => format!("; {more} more not followed, as {MOST_OPEN} were open"),
         };
         let triggers = counted(self.triggers, "trigger");
-        format!("{} of {triggers} answered{latency}{held}{beyond}{cut}", self.answered)
+        format!("{} of {triggers} answered{latency}{held}{beyond}{unseen}{cut}", self.answered)
     }
 }

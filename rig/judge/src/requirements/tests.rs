@@ -363,6 +363,18 @@ fn what_occurs_after_the_last_sample_counts() {
 }
 
 #[test]
+fn a_trigger_between_two_samples_without_one_in_its_time_leaves_the_response_untested() {
+    let respond = |then: &str| format!("when = 'fault.encoder_stuck'\nthen = '{then}'\nwithin = '0.3 ms'");
+    let [holds, fails] = ["l1.force < 1 N", "l1.force > 1 N"].map(respond);
+    let run = |at_ms| Run::of(&[0.0; 12]).struck_at(1.9).struck_at(at_ms);
+    assert_eq!(run(3.8).judge(&holds).result, Passed);
+    let unseen = run(3.2).judge(&holds);
+    let why = "1 trigger between two samples not judged: make within longer than a cycle";
+    assert!(unseen.result == Untested && unseen.finding.contains(why), "{unseen:?}");
+    assert_eq!(run(3.2).judge(&fails).result, Failed);
+}
+
+#[test]
 fn an_answer_that_the_end_of_the_run_cuts_is_said_to_be() {
     let run = Run::of(&[0.0; 12]).struck_at(1.0).stopping_at(6);
     let respond =
