@@ -97,7 +97,7 @@ impl SearchArgs {
     }
 }
 
-/// Searches; [`Exit::Failed`] if a margin below zero was found.
+/// Searches; [`Exit::Failed`] if a margin below zero was found, or no run was judged.
 pub(super) fn search(args: &SearchArgs) -> Result<Exit, Failure> {
     let mut campaign = plan(&args.file, args.play.controller).usage()?;
     // The archive is that of a random campaign, whose points the search chooses.
@@ -107,16 +107,19 @@ pub(super) fn search(args: &SearchArgs) -> Result<Exit, Failure> {
     status!("at most {} runs; results in {}", args.search.runs, player.folder.path().display());
     let Found { first, results } = search::search(&args.search, args.requirement(), &player)?;
     let runs = results.len();
+    let judged = results.iter().filter(|result| result.is_judged()).count();
     let Some((report, worst)) = player.report(results, args.play.record)? else {
         return Ok(Exit::Interrupted);
     };
-    let found = first.map_or_else(
-        || format!("nothing below zero in {runs} runs\n"),
-        |first| format!("below zero after {first} runs\n"),
-    );
+    let found = match (first, runs - judged) {
+        (Some(first), _) => format!("below zero after {first} runs\n"),
+        (None, 0) => format!("nothing below zero in {runs} runs\n"),
+        (None, others) => format!("nothing below zero in {runs} runs, of which {others} were not judged\n"),
+    };
     let again = worst.first().map_or_else(String::new, |worst| format!("again: {}\n", worst.command));
     result(&(found + &again + &report.files(&player.folder))).incomplete()?;
-    Ok(if first.is_some() { Exit::Failed } else { Exit::Passed })
+    // Where nothing was judged, nothing was searched.
+    Ok(if first.is_some() || judged == 0 { Exit::Failed } else { Exit::Passed })
 }
 
 fn check_search(campaign: &Campaign, args: &SearchArgs) -> anyhow::Result<()> {

@@ -40,10 +40,13 @@ fn value(result: &CaseResult, requirement: Option<&str>) -> Value {
     if !result.is_judged() {
         return Value::Nothing;
     }
+    let stopped = (!result.has_passed()).then_some(STOPPED);
     let margin = match requirement {
         Some(name) => {
             let check = result.checks.iter().find(|check| check.name == name);
-            check.and_then(|check| check.relative_margin.or((check.passed == Some(false)).then_some(STOPPED)))
+            let margin = check.and_then(|check| check.relative_margin);
+            // A margin says nothing of a case that failed in another way.
+            margin.filter(|margin| result.has_passed() || *margin < 0.0).or(stopped)
         }
         None if !result.has_passed() => {
             Some(result.least_margin().map_or(STOPPED, |(_, margin)| margin.min(STOPPED)))
@@ -159,6 +162,33 @@ range = [0.5, 1.0]
             value(&CaseResult::new(&case, &verdict, &figures, 0.0), Some("incisal"))
         };
         search.run(4, evaluate).expect("the corner is found")
+    }
+
+    #[test]
+    fn a_case_that_fails_in_another_way_is_worse_than_every_margin() {
+        let stopped = "[[faults]]\nkind = 'drive_fault'\naxis = 'l1'\nat_s = 0.3\n";
+        let idle = "[[faults]]\nkind = 'drive_fault'\naxis = 'l1'\nat_s = 9.0\n";
+        let value_of = |more: &str, requirement| {
+            let base = Scenario::parse("base.toml".as_ref(), &format!("{SCENARIO}{more}")).unwrap();
+            let campaign = Campaign {
+                file: toml::from_str(CAMPAIGN).unwrap(),
+                controller: "motion".to_owned(),
+                program: "test".to_owned(),
+                folder: "/".into(),
+                base: base.to_toml(),
+            };
+            let case = campaign.case_at(0, &[0.5; 4], 0);
+            let scenario = case.scenario.as_ref().expect("the point is a scenario");
+            let played = Runner::default().play(Source::Scenario(scenario));
+            let Judged { verdict, figures } =
+                played.map_err(|failure| failure.error).expect("it can be played");
+            value(&CaseResult::new(&case, &verdict, &figures, 0.0), requirement)
+        };
+        for requirement in [Some("incisal"), None] {
+            assert!(matches!(value_of("", requirement), Value::Margin(margin) if margin > 0.0));
+            assert!(matches!(value_of(stopped, requirement), Value::Margin(margin) if margin <= STOPPED));
+            assert!(matches!(value_of(idle, requirement), Value::Nothing));
+        }
     }
 
     #[test]
