@@ -19,6 +19,8 @@ pub(crate) struct Case {
     /// Its values of a matrix, each as `KEY=VALUE`.
     pub(crate) set: Vec<String>,
     pub(crate) tags: Vec<String>,
+    /// Whether its file cannot be read, so that nobody knows its tags.
+    is_unread: bool,
     /// Whether it cannot run in one thread.
     pub(crate) needs_processes: bool,
 }
@@ -45,7 +47,8 @@ pub(crate) struct Selection {
 
 impl Selection {
     fn has(&self, case: &Case) -> bool {
-        let has_tag = self.tags.is_empty() || self.tags.iter().any(|tag| case.tags.contains(tag));
+        let is_any = self.tags.is_empty() || case.is_unread;
+        let has_tag = is_any || self.tags.iter().any(|tag| case.tags.contains(tag));
         has_tag && self.choice.as_ref().is_none_or(|choice| choice.holds(&case.name, &case.tags))
     }
 }
@@ -77,7 +80,11 @@ impl Cases {
         let all: Vec<_> = named(files).into_iter().flat_map(|(name, path)| cases_of(&name, &path)).collect();
         let count = all.len();
         let names: Vec<_> = all.iter().map(|case| case.name.clone()).collect();
-        let mut chosen: Vec<_> = all.into_iter().filter(|case| selection.has(case)).collect();
+        let (mut chosen, others): (Vec<_>, Vec<_>) = all.into_iter().partition(|case| selection.has(case));
+        let unread = others.iter().filter(|case| case.is_unread);
+        left_out.extend(
+            unread.map(|case| format!("{} (it cannot be read: its tags are unknown)", case.path.display())),
+        );
         if chosen.is_empty() {
             bail!("no scenario is chosen by name and tag; there are: {}", names.join(", "));
         }
@@ -160,7 +167,7 @@ fn cases_of(name: &str, path: &Path) -> Vec<Case> {
         let changed = scenario_with(Some(path), &set);
         let needs_processes = changed.is_ok_and(|scenario| needs_processes(&scenario));
         let tags = scenario.as_ref().map_or_else(Vec::new, |scenario: &Scenario| scenario.tags.clone());
-        Case { name, path: path.to_owned(), set, tags, needs_processes }
+        Case { name, path: path.to_owned(), set, tags, is_unread: scenario.is_none(), needs_processes }
     };
     match combinations.as_slice() {
         [] => vec![case(MatrixCase::default())],
@@ -239,13 +246,17 @@ mod tests {
             found.map(|found| (found.chosen.len(), found.filtered_out)).map_err(|error| error.to_string())
         };
         let by_tag = || Selection { tags: vec!["slow".to_owned()], ..Selection::default() };
-        assert_eq!(chosen(by_tag()), Ok((4, 2)));
+        assert_eq!(chosen(by_tag()), Ok((5, 1)), "a scenario that cannot be read may have the tag");
         let choice = Some("slow and not 500".parse().unwrap());
         assert_eq!(chosen(Selection { choice, ..by_tag() }), Ok((2, 4)));
         let shard = |number, of| Selection { shard: Some(Shard { number, of }), ..by_tag() };
-        assert_eq!((chosen(shard(1, 3)), chosen(shard(2, 3))), (Ok((2, 4)), Ok((1, 5))));
-        assert!(chosen(shard(1, 5)).unwrap_err().contains("4 scenarios have no 5 shares"));
-        let other = Selection { tags: vec!["fast".to_owned()], ..Selection::default() };
-        assert!(chosen(other).unwrap_err().contains("there are: a[kind=chewing,rate_hz=500], "));
+        assert_eq!((chosen(shard(1, 3)), chosen(shard(3, 3))), (Ok((2, 4)), Ok((1, 5))));
+        assert!(chosen(shard(1, 6)).unwrap_err().contains("5 scenarios have no 6 shares"));
+        let of_words =
+            |words: &str| Selection { choice: Some(words.parse().unwrap()), ..Selection::default() };
+        assert!(chosen(of_words("fast")).unwrap_err().contains("there are: a[kind=chewing,rate_hz=500], "));
+        let found = Cases::find(&[folder.path().to_owned()], &of_words("slow")).unwrap();
+        let unread = |said: &String| said.ends_with("(it cannot be read: its tags are unknown)");
+        assert!(found.left_out.iter().any(unread), "{:?}", found.left_out);
     }
 }

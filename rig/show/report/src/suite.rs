@@ -401,8 +401,23 @@ impl SuiteReport {
             0 => String::new(),
             others => format!(", {others} not compared"),
         };
+        let gone = self.gone();
+        let gone = match gone.first() {
+            None => String::new(),
+            Some(first) => format!("; {} of the baseline gone, such as {first}", gone.len()),
+        };
         let counts = format!("{smaller} smaller, {larger} larger, {equal} equal{others}");
-        Some(format!("margins since the baseline: {counts}{worst}"))
+        Some(format!("margins since the baseline: {counts}{worst}{gone}"))
+    }
+
+    /// The requirements of the baseline that the scenarios which ran have no more.
+    fn gone(&self) -> Vec<String> {
+        let known = self.baseline.iter().flat_map(|Baseline(rows)| rows.keys());
+        let is_gone = |(scenario, name): &&(String, String)| {
+            let mut ran = self.tested.iter().filter(|tested| tested.name == *scenario);
+            ran.any(|tested| !RequirementRow::all_of(tested, None).iter().any(|row| row.check.name == *name))
+        };
+        known.filter(is_gone).map(|(scenario, name)| format!("{scenario}: {name}")).collect()
     }
 
     /// Every requirement of every scenario, by its id, then by its name.

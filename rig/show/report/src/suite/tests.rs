@@ -148,6 +148,15 @@ fn the_json_is_the_baseline_of_a_later_run() {
     let now = report(vec![tested("a", vec![passed(0.5)]), tested("b", vec![passed(2.0)])], Some(baseline));
     let said = now.trend_in_words().unwrap();
     assert!(said.contains("1 smaller, 0 larger, 1 equal; most of all a: force, 1 → 0.5"), "{said}");
+    let mut renamed = passed(1.0).unwrap();
+    renamed.verdict.checks[0].name = "another".into();
+    let renamed = vec![tested("a", vec![Ok(renamed)])];
+    let now_without = report(renamed, Some(Baseline::read(&path).unwrap()));
+    let said_without = now_without.trend_in_words().unwrap();
+    assert!(
+        said_without.ends_with("1 not compared; 1 of the baseline gone, such as a: force"),
+        "{said_without}"
+    );
     let json: Value = serde_json::from_str(&now.to_json().unwrap()).unwrap();
     let row = &json["requirements"][0];
     assert_eq!(
