@@ -3,7 +3,6 @@
 use std::fmt;
 
 use masseter_judge::{CheckResult, Figures, Verdict};
-use masseter_runtime::messages::codes::EventKind;
 
 use crate::prelude::*;
 use crate::run::runner::{Judged, Runner, Source};
@@ -78,8 +77,7 @@ fn has_failed(verdict: &Verdict, name: &str) -> bool {
     verdict.checks.iter().any(|check| check.name == name && check.result == CheckResult::Failed)
 }
 
-/// The cause of the first fault that somebody detected.
+/// The cause of the first fault that somebody reports of the stop.
 fn first_cause(figures: &Figures) -> Option<String> {
-    let fault = figures.events.iter().find(|event| event.kind == EventKind::Fault)?;
-    Some(fault.cause.to_string())
+    Some(figures.first_fault()?.cause.to_string())
 }

@@ -3,7 +3,7 @@
 
 use std::borrow::Cow;
 
-use masseter_scenario::{ChecksConfig, ExpectConfig, FaultConfig, wording::counted};
+use masseter_scenario::{ChecksConfig, ExpectConfig, FaultConfig, Scenario, wording::counted};
 use serde::Serialize;
 
 use crate::breach::{Bound, Breach, is_within};
@@ -85,6 +85,8 @@ pub(crate) enum Subject {
     Rig,
     /// Which motion was played, and how it ended.
     Sequence,
+    /// Whether everything was recorded.
+    Recording,
     /// The faults that the scenario declares.
     Faults {
         have_all_acted: bool,
@@ -190,15 +192,16 @@ pub(crate) fn tracking(name: &'static str, errors: &PoseErrors, limits: &ChecksC
 
 /// A test with faults that passes without them has tested nothing, also where one struck only after the rig had
 /// stopped, unless it waits for the stop. A fault that leads the jaw beyond the limits must be detected before. None
-/// where no fault is declared. `lasted_s`: how long the run lasted since the motion began, and since the rig was switched on.
+/// where no fault is declared. `suspects`: the numbers of those that acted as the jaw left its path. `lasted_s`: how long the run lasted since the motion began, and since the rig was switched on.
 pub(crate) fn faults(
-    declared: &[FaultConfig],
+    scenario: &Scenario,
     found: &[FaultFigures],
-    limits: &ChecksConfig,
+    suspects: &[usize],
     stopped_ns: Option<u64>,
     lasted_s: [Option<f64>; 2],
 ) -> Option<Check> {
-    let ChecksConfig { tracking_max_mm, tracking_max_deg, .. } = *limits;
+    let Scenario { faults: declared, checks, .. } = scenario;
+    let ChecksConfig { tracking_max_mm, tracking_max_deg, .. } = *checks;
     let behind_end = |fault: &FaultConfig| {
         let at_s = fault.at_s.filter(|_| fault.after.is_none());
         let mut begins_s = [at_s, fault.from_s].into_iter().zip(lasted_s);
@@ -209,7 +212,7 @@ pub(crate) fn faults(
     let (mut behind, mut beyond) = (Vec::new(), Vec::new());
     for (fault, found) in declared.iter().zip(found) {
         let FaultFigures { number, struck_ns, deviation_mm, deviation_deg, detection } = found;
-        let waits = fault.after.as_deref() == Some("controller.safe_stop");
+        let waits = waits_for_stop(scenario, fault.after.as_deref());
         match (struck_ns, behind_end(fault)) {
             (None, None) => never.push(number.to_string()),
             (None, Some(when)) => {
@@ -222,7 +225,9 @@ pub(crate) fn faults(
             }
             (Some(_), _) => acted += 1,
         }
-        if !is_within(*deviation_mm, tracking_max_mm) || !is_within(*deviation_deg, tracking_max_deg) {
+        let is_beyond =
+            !is_within(*deviation_mm, tracking_max_mm) || !is_within(*deviation_deg, tracking_max_deg);
+        if is_beyond && suspects.contains(number) {
             let until = if detection.is_some() { "before it was detected" } else { "undetected" };
             beyond.push(format!(
                 "; number {number}, {fault}, moved the jaw {deviation_mm:.3} mm and {deviation_deg:.3}° from its path {until}, \
@@ -245,6 +250,58 @@ pub(crate) fn faults(
     let finding = format!("{acted} of {} declared faults acted{after}{never}", declared.len());
     let check = Check::new("faults", finding + &behind.concat() + &beyond.concat(), result);
     (!declared.is_empty()).then_some(Check { subject: Subject::Faults { have_all_acted }, ..check })
+}
+
+/// A test with stimuli of which one never began, began only after the rig had stopped, or changes nothing, has not tested what it
+/// should. None without stimuli. `began_ns`: when each began.
+pub(crate) fn stimuli(
+    scenario: &Scenario,
+    began_ns: &[Option<u64>],
+    stopped_ns: Option<u64>,
+) -> Option<Check> {
+    let declared = &scenario.stimulus;
+    let (mut never, mut late, mut idle) = (Vec::new(), Vec::new(), Vec::new());
+    for (place, (stimulus, began_ns)) in declared.iter().zip(began_ns).enumerate() {
+        let is_late = |began_ns| stopped_ns.is_some_and(|stopped_ns| began_ns > stopped_ns);
+        let list = match began_ns {
+            None => &mut never,
+            Some(_) if stimulus.changes_nothing() => &mut idle,
+            Some(began_ns) if is_late(*began_ns) && !waits_for_stop(scenario, stimulus.after.as_deref()) => {
+                &mut late
+            }
+            Some(_) => continue,
+        };
+        list.push((place + 1).to_string());
+    }
+    let began = declared.len() - never.len();
+    let parts = [
+        (never, "never: let the stimulus begin earlier, or play longer"),
+        (late, "only after the rig had stopped"),
+        (idle, "without a force or a mass"),
+    ];
+    let parts: Vec<_> = parts.into_iter().filter(|(numbers, _)| !numbers.is_empty()).collect();
+    let which = parts.iter().map(|(numbers, what)| format!(", number {} {what}", numbers.join(", ")));
+    let finding = format!("{began} of {} stimuli began{}", declared.len(), which.collect::<String>());
+    let result = if parts.is_empty() { CheckResult::Passed } else { CheckResult::Untested };
+    let check = Check::new("stimuli", finding, result);
+    (!declared.is_empty()).then_some(Check { subject: Subject::Stimuli, ..check })
+}
+
+/// Whether an entry that counts from this occurrence waits for a stop: for a state behind the motion, for an operator's stop, or
+/// for another entry that waits for one.
+fn waits_for_stop(scenario: &Scenario, after: Option<&str>) -> bool {
+    let Some((list, name)) = after.and_then(|after| after.split_once('.')) else { return false };
+    let named = |own: &str| own == name;
+    match list {
+        "controller" => ["holding", "disabling", "finished", "safe_stop"].contains(&name),
+        "fault" => scenario
+            .faults
+            .iter()
+            .any(|fault| named(fault.name()) && waits_for_stop(scenario, fault.after.as_deref())),
+        _ => scenario.stimulus.iter().any(|stimulus| {
+            named(stimulus.name()) && (stimulus.stop || waits_for_stop(scenario, stimulus.after.as_deref()))
+        }),
+    }
 }
 
 #[cfg(test)]

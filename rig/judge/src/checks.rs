@@ -7,10 +7,11 @@
 use masseter_recording::{Ending, Manifest};
 use masseter_runtime::messages::codes::{Cause, ControllerState};
 use masseter_runtime::{named::PlayedMotion, schedule::CycleSchedule};
-use masseter_scenario::{Dimension, ExpectedVerdict, StimulusConfig, wording::counted};
+use masseter_scenario::{Dimension, ExpectedVerdict, wording::counted};
 
-use crate::check::{Check, CheckFigures, CheckResult, Subject, faults, tracking};
+use crate::check::{Check, CheckFigures, CheckResult, Subject, faults, stimuli, tracking};
 use crate::response::{BusResponse, ResponseFigures};
+use crate::stop_cause::suspects;
 use crate::timing::{Timing, TimingWord};
 use crate::{
     breach::Breach, events::EventRecord, figures::Figures, played::MotionFigures,
@@ -66,9 +67,10 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     ]);
     // No lost cycle excuses a declared fault that led the jaw too far.
     let stopped_ns = figures.stopped_ns();
-    let faults = faults(&manifest.scenario.faults, &figures.faults, limits, stopped_ns, lasted_s(figures));
+    let suspects = suspects(figures);
+    let faults = faults(&manifest.scenario, &figures.faults, &suspects, stopped_ns, lasted_s(figures));
     checks.extend(faults.map(|check| check.with_breach(path.first.clone())));
-    checks.extend(stimuli(&manifest.scenario.stimulus, figures));
+    checks.extend(stimuli(&manifest.scenario, &began_ns(manifest, figures), stopped_ns));
     checks
         .extend(figures.requirements.iter().map(|requirement| self::requirement(requirement, is_disturbed)));
     checks
@@ -206,32 +208,27 @@ fn sequence(manifest: &Manifest, figures: &Figures) -> Check {
     };
     let as_expected = if is_good { as_expected } else { "" };
     let whose = whose_motion(manifest);
-    let breach = Breach::new("last state", &in_words, "finished, without a stop").at(figures.stopped_ns());
+    let due = if is_expected(ExpectedVerdict::Interrupted) {
+        "finished, after a stop before the motion's end"
+    } else {
+        "finished, without a stop"
+    };
+    let breach = Breach::new("last state", &in_words, due).at(figures.stopped_ns());
     Check::judged(NAME, format!("ended in state {in_words}{how}{as_expected}{whose}"), is_good)
         .with_breach(breach)
 }
 
-/// A test with stimuli of which one never began has not tested what it should. `None` without stimuli.
-fn stimuli(declared: &[StimulusConfig], figures: &Figures) -> Option<Check> {
-    let Figures { events, ended_ns, .. } = figures;
-    let is_begin = |event: &EventRecord, number| {
-        event.cause == Cause::StimulusBegan
-            && event.value as usize == number
-            && ended_ns.is_none_or(|ended_ns| event.time_ns <= ended_ns)
+/// When each stimulus first began, ns; none after the controller's end.
+fn began_ns(manifest: &Manifest, Figures { events, ended_ns, .. }: &Figures) -> Vec<Option<u64>> {
+    let of = |place: usize| {
+        let is_begin = |event: &&EventRecord| {
+            event.cause == Cause::StimulusBegan
+                && event.value as usize == place + 1
+                && ended_ns.is_none_or(|ended_ns| event.time_ns <= ended_ns)
+        };
+        events.iter().find(is_begin).map(|event| event.time_ns)
     };
-    let idle: Vec<_> = (1..=declared.len())
-        .filter(|number| !events.iter().any(|event| is_begin(event, *number)))
-        .map(|number| number.to_string())
-        .collect();
-    let began = format!("{} of {} stimuli began", declared.len() - idle.len(), declared.len());
-    let check = if idle.is_empty() {
-        Check::judged("stimuli", began, true)
-    } else {
-        let which = idle.join(", ");
-        let why = format!("{began}, number {which} never: let the stimulus begin earlier, or play longer");
-        Check::untested("stimuli", why)
-    };
-    (!declared.is_empty()).then_some(Check { subject: Subject::Stimuli, ..check })
+    (0..manifest.scenario.stimulus.len()).map(of).collect()
 }
 
 /// A requirement of the scenario. The machine excuses a failure where a lost cycle may have caused it.
@@ -263,14 +260,15 @@ fn dropped_messages(missing: u64, ending: &Ending, is_cut_short: bool, is_damage
         (is_damaged, "the recording is damaged"),
         (*ending == Ending::RecordingFailed, "the recorder could not write everything"),
     ];
-    match reasons.into_iter().find(|(is_so, _)| *is_so) {
+    let check = match reasons.into_iter().find(|(is_so, _)| *is_so) {
         Some((_, why)) if missing == 0 => Check::not_judged(NAME, format!("no gap, but {why}")),
         _ => Check::judged(NAME, missing.to_string(), missing == 0).with_breach(Breach::new(
             "not recorded",
             counted(missing, "message"),
             "0",
         )),
-    }
+    };
+    Check { subject: Subject::Recording, ..check }
 }
 
 /// No message may take longer on its bus than the plan allows at worst. Frames beside a stall are left out only where the

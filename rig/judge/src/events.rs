@@ -12,6 +12,9 @@ use masseter_runtime::named::Declared;
 use masseter_scenario::{Dimension, Unit};
 use serde::{Serialize, Serializer};
 
+/// What ended longer before a report, or was reported longer before a stop, is another matter, ns.
+pub(crate) const AFTERMATH_NS: u64 = 500_000_000;
+
 /// The meaning of a code, or its number where the code has no meaning in this version.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Code<T> {
@@ -93,6 +96,11 @@ impl EventRecord {
         self.source == Source::Master && self.kind == EventKind::Fault
     }
 
+    /// Whether it is the emergency message of a drive that has no error (error register 00h).
+    pub fn is_without_error(&self) -> bool {
+        self.source == Source::Drive && self.cause == Cause::Emergency && self.limit == 0.0
+    }
+
     /// The event in words, without its time.
     pub fn in_words(&self) -> String {
         let Self { source, cause, .. } = self;
@@ -137,7 +145,8 @@ impl EventRecord {
 
     /// The same, of a run on these interfaces whose controller declared these parameters.
     pub(crate) fn of_run(event: &Event, declared: &Declared, interfaces: &[String]) -> Self {
-        let text = explain(event, interfaces).or_else(|| change(event, declared));
+        let text = of_force_control(event, declared).or_else(|| explain(event, interfaces));
+        let text = text.or_else(|| change(event, declared));
         Self { text, ..event.into() }
     }
 }
@@ -167,6 +176,27 @@ impl From<&Event> for EventRecord {
     }
 }
 
+/// The first heard fault that belongs to the stop.
+pub(crate) fn first_report(
+    events: &[EventRecord],
+    is_heard: impl Fn(&EventRecord) -> bool,
+) -> Option<&EventRecord> {
+    let stops = events.iter().filter(|event| event.begins_stop());
+    let since_ns = stops.map(|event| event.time_ns).min().map_or(0, |ns| ns.saturating_sub(AFTERMATH_NS));
+    let belongs = |event: &&EventRecord| {
+        event.kind == EventKind::Fault && event.time_ns >= since_ns && !event.is_without_error()
+    };
+    events.iter().filter(belongs).find(|event| is_heard(event))
+}
+
+/// The sentence for the rig's own control of the bite force, which gives up in two cases alone.
+fn of_force_control(event: &Event, declared: &Declared) -> Option<String> {
+    let has_failed = event.cause == Cause::LawFailed.code() && event.value == 0.0 && event.limit == 0.0;
+    let is_own = has_failed && declared.signals.iter().any(|signal| signal.name == "force_phase");
+    let why = "the bite: food keeps the mouth further open than force_control.reach_m, or the load cell is at an end of its range";
+    is_own.then(|| why.to_owned())
+}
+
 /// The sentence for a parameter that was set.
 fn change(event: &Event, declared: &Declared) -> Option<String> {
     let is_set = event.cause == Cause::ParameterSet.code();
@@ -181,6 +211,18 @@ mod tests {
     use masseter_runtime::messages::codes::EventKind;
 
     use super::*;
+
+    #[test]
+    fn the_rigs_own_force_control_says_why_it_gives_up_and_a_users_law_is_asked() {
+        let failed = Event::new(Source::Controller, EventKind::Fault, Cause::LawFailed);
+        let failed = Event { value: 0.0, limit: 0.0, ..failed };
+        let words = |declared: &Declared| EventRecord::of_run(&failed, declared, &[]).in_words();
+        assert!(words(&Declared::default()).contains("see the message of your controller"));
+        let (name, unit, about) = ("force_phase".to_owned(), String::new(), String::new());
+        let signals = vec![masseter_runtime::named::Signal { name, unit, about }];
+        let own = words(&Declared { signals, ..Declared::default() });
+        assert!(own.contains("force_control.reach_m"), "{own}");
+    }
 
     #[test]
     fn a_code_is_written_as_its_name_and_an_unknown_code_as_its_number() {

@@ -4,10 +4,10 @@
 
 use masseter_model::geometry::AXES;
 use masseter_recording::Damage;
-use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind};
+use masseter_runtime::messages::codes::{Cause, ControllerState};
 use serde::Serialize;
 
-use crate::events::{Code, EventRecord};
+use crate::events::{Code, EventRecord, first_report};
 use crate::loads::{AxisFigures, ContactFigures};
 use crate::lost_cycles::{Outage, ReadingFigures};
 use crate::messages::{ParameterFigures, SignalFigures, TopicFigures};
@@ -125,9 +125,6 @@ pub struct Figures {
     pub over_time: OverTime,
 }
 
-/// A fault that ended may show so long after, ns.
-const AFTERMATH_NS: u64 = 500_000_000;
-
 impl Figures {
     /// Messages that were published and not recorded.
     pub fn missing_messages(&self) -> u64 {
@@ -139,9 +136,9 @@ impl Figures {
         self.events.iter().any(|event| event.cause == Cause::StopRequested)
     }
 
-    /// The first fault that anybody reports.
-    pub(crate) fn first_fault(&self) -> Option<&EventRecord> {
-        self.events.iter().find(|event| event.kind == EventKind::Fault)
+    /// The first fault that anybody reports of what stopped the rig.
+    pub fn first_fault(&self) -> Option<&EventRecord> {
+        first_report(&self.events, |_| true)
     }
 
     /// When the rig began to stop: a safe stop, or one by request. A program stops without an event.
@@ -149,21 +146,5 @@ impl Figures {
         let is_stop = |event: &&EventRecord| event.begins_stop() || event.cause == Cause::StopRequested;
         let stops = self.events.iter().filter(is_stop);
         stops.map(|event| event.time_ns).min().or(self.stop_without_event_ns)
-    }
-
-    /// The fault of the scenario that struck last before anybody reported a fault, unless the fault had ended long before.
-    pub(crate) fn declared_cause(&self) -> Option<&FaultFigures> {
-        let reported_ns = self.first_fault().map_or(u64::MAX, |event| event.time_ns);
-        let ended_ns = |fault: &FaultFigures| {
-            let is_its_end = |event: &&EventRecord| {
-                event.cause == Cause::FaultEnded && event.value as usize == fault.number
-            };
-            self.events.iter().filter(is_its_end).map(|event| event.time_ns).next_back()
-        };
-        let is_recent = |fault: &FaultFigures| {
-            ended_ns(fault).is_none_or(|ended_ns| reported_ns <= ended_ns.saturating_add(AFTERMATH_NS))
-        };
-        let struck = self.faults.iter().filter(|fault| fault.struck_ns.is_some_and(|ns| ns <= reported_ns));
-        struck.filter(|fault| is_recent(fault)).max_by_key(|fault| fault.struck_ns)
     }
 }

@@ -37,6 +37,7 @@ pub mod signals;
 mod skips;
 mod standstill;
 mod statistic;
+mod stop_cause;
 mod timing;
 mod tracking;
 mod verdict;

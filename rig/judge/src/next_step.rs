@@ -2,12 +2,14 @@
 
 use masseter_can::codes;
 use masseter_recording::{Ending, Manifest};
+use masseter_runtime::injection::Injected;
 use masseter_runtime::messages::codes::Cause;
 use masseter_scenario::ExpectedVerdict::{Died, Fail, Incomplete, Interrupted, Pass, SafeStop, Untested};
 use masseter_scenario::Scenario;
 
 use crate::check::{Check, Subject};
 use crate::outcome::{Outcome, clock_jump};
+use crate::stop_cause::declared_cause;
 use crate::{breach::Breach, checks::lag_cause, events::Code, figures::Figures};
 
 codes! {
@@ -41,58 +43,60 @@ codes! {
         Bus = 12 "Find the late message in `RUN/report.html` under buses, then look for other senders on that bus (docs/can.md).",
         /// SAFE STOP by a fault of the scenario.
         DeclaredFault = 13 "A fault of the scenario caused this stop; if the stop is right, set `expect.verdict` to safe_stop (docs/requirements.md).",
+        /// SAFE STOP by a stimulus of the scenario.
+        DeclaredStimulus = 14 "A stimulus of the scenario came before this stop; if the stop is right, set `expect.verdict` to safe_stop (docs/requirements.md).",
         /// SAFE STOP by a drive.
-        Drive = 14 "Remove the cause of the drive's error, which the events in `RUN/report.html` name (docs/robot.md), then run again.",
+        Drive = 15 "Remove the cause of the drive's error, which the events in `RUN/report.html` name (docs/robot.md), then run again.",
         /// SAFE STOP by lost messages or nodes.
-        Lost = 15 "Check wiring, power and bit rate of the named node; `RUN/report.html` shows axis and buses around the stop (docs/can.md).",
+        Lost = 16 "Check wiring, power and bit rate of the named node; `RUN/report.html` shows axis and buses around the stop (docs/can.md).",
         /// SAFE STOP by a configuration of a drive that is not as expected.
-        Configuration = 16 "Run `masseter robot inspect RUN/scenario.toml` to see every object that differs, then correct the drive or its profile (docs/robot.md).",
+        Configuration = 17 "Run `masseter robot inspect RUN/scenario.toml` to see every object that differs, then correct the drive or its profile (docs/robot.md).",
         /// SAFE STOP by a limit of an axis.
-        Limit = 17 "Keep the motion within the axis' limits: smaller, slower or elsewhere; `RUN/report.html` shows the axis around the stop (docs/motions.md).",
+        Limit = 18 "Keep the motion within the axis' limits: smaller, slower or elsewhere; `RUN/report.html` shows the axis around the stop (docs/motions.md).",
         /// SAFE STOP by the distance from the path.
-        OffPath = 18 "Compare true and reported position around the stop in `RUN/report.html`, then tune the controller (docs/tutorials/bring-up.md), or check the axis.",
+        OffPath = 19 "Compare true and reported position around the stop in `RUN/report.html`, then tune the controller (docs/tutorials/bring-up.md), or check the axis.",
         /// SAFE STOP by missing readings or commands.
-        Stale = 19 "Find what delayed controller or plant: `masseter doctor`, then the longest cycles in `RUN/report.html` (docs/interface.md).",
+        Stale = 20 "Find what delayed controller or plant: `masseter doctor`, then the longest cycles in `RUN/report.html` (docs/interface.md).",
         /// SAFE STOP by the controller's law or its messages.
-        Law = 20 "Repeat the decisions with `masseter replay RUN`, then correct the controller at the cycle of the event (docs/interface.md).",
+        Law = 21 "Repeat the decisions with `masseter replay RUN`, then correct the controller at the cycle of the event (docs/interface.md).",
         /// SAFE STOP by the law or the messages of a program.
-        ProgramLaw = 21 "Read the messages of the program in the terminal, then correct its command at the cycle of the event (docs/interface.md).",
+        ProgramLaw = 22 "Read the messages of the program in the terminal, then correct its command at the cycle of the event (docs/interface.md).",
         /// SAFE STOP by a pose that the mechanism cannot have.
-        Pose = 22 "Compare the scenario's `mechanism` with the rig, and the motion with its reach (docs/forward-kinematics.md, docs/motions.md).",
+        Pose = 23 "Compare the scenario's `mechanism` with the rig, and the motion with its reach (docs/forward-kinematics.md, docs/motions.md).",
         /// SAFE STOP by a start too far away.
-        Start = 23 "Bring the jaw closer to the first pose of the motion, or raise `controller.start_tolerance_mm` (docs/robot.md).",
+        Start = 24 "Bring the jaw closer to the first pose of the motion, or raise `controller.start_tolerance_mm` (docs/robot.md).",
         /// SAFE STOP by a bite force above the limit.
-        TooHard = 24 "Close more slowly, or state the stiffness of food and teeth in `force_control`; `overload` is the limit (docs/dynamics-control.md).",
+        TooHard = 25 "Close more slowly, or state the stiffness of food and teeth in `force_control`; `overload` is the limit (docs/dynamics-control.md).",
         /// SAFE STOP without a cause of these.
-        Stop = 25 "Read the events in `RUN/report.html` from the first fault on; docs/troubleshooting.md lists causes and remedies.",
+        Stop = 26 "Read the events in `RUN/report.html` from the first fault on; docs/troubleshooting.md lists causes and remedies.",
         /// DIED: the controller.
-        ControllerDied = 26 "Read the controller's own messages in the terminal, then repeat its readings under a debugger (docs/interface.md): `masseter replay RUN`.",
+        ControllerDied = 27 "Read the controller's own messages in the terminal, then repeat its readings under a debugger (docs/interface.md): `masseter replay RUN`.",
         /// DIED: a program.
-        ProgramDied = 27 "Read the messages of the program in the terminal, then start it under a debugger: `masseter run --controller external` waits for it.",
+        ProgramDied = 28 "Read the messages of the program in the terminal, then start it under a debugger: `masseter run --controller external` waits for it.",
         /// DIED: a process that a fault of the scenario killed.
-        DeclaredDeath = 28 "A fault of the scenario killed the process; if the death is right, set `expect.verdict` to died (docs/requirements.md).",
+        DeclaredDeath = 29 "A fault of the scenario killed the process; if the death is right, set `expect.verdict` to died (docs/requirements.md).",
         /// DIED: another process.
-        ProcessDied = 29 "Run `masseter doctor` to see what the machine lacks, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
+        ProcessDied = 30 "Run `masseter doctor` to see what the machine lacks, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
         /// INVALID by lost cycles.
-        LostCycles = 30 "Run `masseter doctor` and remove what it lists, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
+        LostCycles = 31 "Run `masseter doctor` and remove what it lists, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
         /// INVALID by lost cycles, where the doctor knows the best remedy.
-        Mend = 31 "Run `MEND`, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
+        Mend = 32 "Run `MEND`, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
         /// INVALID without real time.
-        NoRealTime = 32 "Run `masseter doctor`, which names the missing permission and the command that gives it, then repeat the run.",
+        NoRealTime = 33 "Run `masseter doctor`, which names the missing permission and the command that gives it, then repeat the run.",
         /// INVALID by a clock that was set.
-        ClockSet = 33 "Let nothing set the clock, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
+        ClockSet = 34 "Let nothing set the clock, then repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
         /// INCOMPLETE.
-        Unwritten = 34 "Free the disk, save what was written with `masseter recording recover RUN`, then repeat the run.",
+        Unwritten = 35 "Free the disk, save what was written with `masseter recording recover RUN`, then repeat the run.",
         /// INTERRUPTED by the user.
-        Repeat = 35 "To judge the whole motion, repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
+        Repeat = 36 "To judge the whole motion, repeat the run: `masseter run RUN/scenario.toml --clock CLOCK`.",
         /// INTERRUPTED by a stimulus of the scenario.
-        DeclaredStop = 36 "The scenario asks for this stop; if the stop is right, set `expect.verdict` to interrupted (docs/requirements.md).",
+        DeclaredStop = 37 "The scenario asks for this stop; if the stop is right, set `expect.verdict` to interrupted (docs/requirements.md).",
         /// UNTESTED: a fault or stimulus did not act.
-        NeverActed = 37 "Let the fault or stimulus act while the motion runs: change its time in `RUN/scenario.toml`, then run that file as before.",
+        NeverActed = 38 "Let the fault or stimulus act while the motion runs: change its time in `RUN/scenario.toml`, then run that file as before.",
         /// UNTESTED: a requirement.
-        NotJudged = 38 "Choose a window, trigger or signal that this motion has, or let a fault bring it, in `RUN/scenario.toml`, then run that file as before (docs/requirements.md).",
+        NotJudged = 39 "Choose a window, trigger or signal that this motion has, or let a fault bring it, in `RUN/scenario.toml`, then run that file as before (docs/requirements.md).",
         /// UNTESTED: anything else.
-        TooLittle = 39 "Change what the reason names in `RUN/scenario.toml`, such as `duration_s` where it asks for more of the motion, then run that file as before.",
+        TooLittle = 40 "Change what the reason names in `RUN/scenario.toml`, such as `duration_s` where it asks for more of the motion, then run that file as before.",
     }
 }
 
@@ -115,7 +119,7 @@ impl NextStep {
             (Outcome::Named(Fail) | Outcome::ChecksFailed, _) => {
                 Self::of_failure(manifest, figures, checks, first_breach)
             }
-            (Outcome::Named(SafeStop), _) => Self::of_stop(figures, is_of_program),
+            (Outcome::Named(SafeStop), _) => Self::of_stop(manifest, figures),
             (Outcome::Named(Died), _) if was_killed() => Self::DeclaredDeath,
             (Outcome::Named(Died), Ending::Died { process, .. }) if process == "controller" => {
                 if is_of_program {
@@ -168,8 +172,8 @@ impl NextStep {
         }
     }
 
-    /// By the first fault that anybody reports, unless a fault of the scenario came before.
-    fn of_stop(figures: &Figures, is_of_program: bool) -> Self {
+    /// By the first fault that anybody reports, unless a fault or stimulus of the scenario came before.
+    fn of_stop(manifest: &Manifest, figures: &Figures) -> Self {
         use Cause::{
             AccelerationLimit, BadMessage, BootTimeout, BusOff, BusRefused, CommandLost, DriveFault,
             DuplicateNode, Emergency, EnableTimeout, EndStopHit, FaultAtStart, FaultFound, FollowingError,
@@ -179,9 +183,12 @@ impl NextStep {
             StartTooFar, StillPowered, StrokeLimit, TrackingLost, UnknownNode, VelocityLimit, WrongIdentity,
             WrongLength, WrongObject, WrongPdo, WrongUnit,
         };
-        if figures.declared_cause().is_some() {
-            return Self::DeclaredFault;
+        match declared_cause(manifest, figures).map(|cause| cause.injected) {
+            Some(Injected::Fault(_)) => return Self::DeclaredFault,
+            Some(Injected::Stimulus(_)) => return Self::DeclaredStimulus,
+            None => {}
         }
+        let is_of_program = manifest.is_of_program();
         let Some(Code::Known(cause)) = figures.first_fault().map(|event| event.cause) else {
             return Self::Stop;
         };

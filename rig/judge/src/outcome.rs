@@ -2,7 +2,8 @@
 //! [verdict](super::verdict)'s.
 
 use masseter_recording::{Ending, Manifest, RunUsage};
-use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind, Source};
+use masseter_runtime::injection::Injected;
+use masseter_runtime::messages::codes::{Cause, ControllerState, Source};
 use masseter_scenario::ExpectedVerdict::{
     self, Died, Fail, Incomplete, Interrupted, Pass, SafeStop, Untested,
 };
@@ -11,9 +12,14 @@ use masseter_scenario::{CanConfig, Scenario};
 use masseter_terminal::Exit;
 
 use crate::checks::{is_often_late, lag_cause};
-use crate::played::{MotionFigures, StoppedBy};
+use crate::played::StoppedBy;
+use crate::stop_cause::{DeclaredCause, declared_cause, has_declared_fault};
 use crate::{
-    events::EventRecord, figures::Figures, lost_cycles::Outage, shortfall::Shortfall, timing::Timing,
+    events::{EventRecord, first_report},
+    figures::Figures,
+    lost_cycles::Outage,
+    shortfall::Shortfall,
+    timing::Timing,
 };
 
 /// The outcome of a run.
@@ -114,12 +120,9 @@ pub(crate) fn stopped_by_stimulus(scenario: &Scenario, events: &[EventRecord]) -
 /// The first fault explains the stop: the controller's own event often names only the master. A controller that reports
 /// another end explains nothing. `by`: what master or drives show of it, whatever the controller reports.
 ///
-/// A declared fault stands before what followed from it.
+/// A declared fault or stimulus stands before what followed from it.
 fn stopped(by: Option<StoppedBy>, declared: Option<String>, events: &[EventRecord]) -> String {
-    let is_heard = |event: &&EventRecord| {
-        event.kind == EventKind::Fault && (by.is_none() || event.source != Source::Controller)
-    };
-    let first = events.iter().find(is_heard);
+    let first = first_report(events, |event| by.is_none() || event.source != Source::Controller);
     let since_s = |fault: &EventRecord| since_motion_s(events, fault.time_ns);
     let who = by.map_or_else(|| "the controller stopped the rig".to_owned(), |by| by.to_string());
     match (declared, first) {
@@ -142,12 +145,19 @@ fn since_motion_s(events: &[EventRecord], time_ns: u64) -> Option<f64> {
     Some(time_ns.checked_sub(began.time_ns)? as f64 / 1e9)
 }
 
-/// The fault of the scenario that came before every reported one, in words.
-pub(crate) fn declared_cause(scenario: &Scenario, figures: &Figures) -> Option<String> {
-    let cause = figures.declared_cause()?;
-    let declared = scenario.faults.get(cause.number.checked_sub(1)?)?;
-    let at = since_motion_s(&figures.events, cause.struck_ns?);
-    Some(format!("fault {declared}{}", at.map_or_else(String::new, |at_s| format!(" at {at_s:.3} s"))))
+/// The fault or stimulus of the scenario that explains the stop, in words.
+pub(crate) fn declared_in_words(manifest: &Manifest, figures: &Figures) -> Option<String> {
+    let DeclaredCause { injected, struck_ns } = declared_cause(manifest, figures)?;
+    let declared = match injected {
+        Injected::Fault(place) => format!("fault {}", manifest.scenario.faults.get(place)?),
+        Injected::Stimulus(place) => {
+            let stimulus = manifest.scenario.stimulus.get(place)?;
+            let name = Some(stimulus.name()).filter(|name| *name != stimulus.to_string());
+            format!("stimulus {stimulus}{}", name.map_or_else(String::new, |name| format!(" ({name})")))
+        }
+    };
+    let at = since_motion_s(&figures.events, struck_ns);
+    Some(format!("{declared}{}", at.map_or_else(String::new, |at_s| format!(" at {at_s:.3} s"))))
 }
 
 /// When a process died, by the last cycle that both loops ran.
@@ -220,7 +230,7 @@ pub(crate) fn excuse(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
     let beyond_s = manifest.scenario.controller.overdue_s;
     // No lost cycle excuses a declared fault that led the jaw off its path.
     let is_off_path =
-        figures.declared_cause().is_none() && figures.first_fault().is_some_and(EventRecord::stops_off_path);
+        !has_declared_fault(figures) && figures.first_fault().is_some_and(EventRecord::stops_off_path);
     let explains = if is_off_path { Outage::explains_a_deviation } else { Outage::explains_the_stop };
     let outage = figures.outage.filter(|outage| explains(*outage));
     match (&manifest.ending, figures.stopped_by) {
@@ -251,7 +261,8 @@ pub(crate) fn with_shortfall(
 }
 
 /// The reason of a pass, with what somebody has to know beside.
-pub(crate) fn passed(manifest: &Manifest, motion: &MotionFigures) -> String {
+pub(crate) fn passed(manifest: &Manifest, figures: &Figures) -> String {
+    let motion = &figures.motion;
     let late = motion.lag_ms.filter(|lag_ms| *lag_ms >= LEAST_LAG_MS);
     let late = late.map_or_else(String::new, |lag_ms| format!("; motion delayed by {lag_ms:.0} ms"));
     let commands = if manifest.is_in_real_time() && is_often_late(manifest, motion) {
@@ -259,7 +270,29 @@ pub(crate) fn passed(manifest: &Manifest, motion: &MotionFigures) -> String {
     } else {
         String::new()
     };
-    format!("every check passed{late}{commands}")
+    let idle = idle_force(manifest, figures).map_or_else(String::new, |idle| format!("; {idle}"));
+    format!("every check passed{late}{commands}{idle}")
+}
+
+/// What estimate and control of the bite force that the scenario asks for never did. A law of a user takes their place.
+fn idle_force(manifest: &Manifest, figures: &Figures) -> Option<&'static str> {
+    if manifest.is_of_program() {
+        return None;
+    }
+    let signal = |name| figures.signals.iter().find(move |found| found.signal.name == name);
+    let is_below =
+        |name, least: f64| signal(name).is_some_and(|found| found.max.is_none_or(|max| max < least));
+    if signal("bite_force_n").is_some_and(|found| found.values == 0) {
+        return Some(
+            "the bite force was never estimated: shorten force_estimate.calibration_s, or play longer",
+        );
+    }
+    if is_below("force_phase", 1.0) {
+        return Some("the bite force was never controlled: no contact came while the mouth closed");
+    }
+    is_below("probed_stiffness_n_per_m", f64::MIN_POSITIVE).then_some(
+        "no probe of the stiffness came to its end: the motion left it no time, or the force no rise",
+    )
 }
 
 #[cfg(test)]

@@ -4,10 +4,11 @@
 use std::fmt::{self, Display, Formatter};
 
 use masseter_recording::{Ending, Manifest};
-use masseter_runtime::messages::codes::{Cause, ControllerState};
+use masseter_runtime::messages::codes::ControllerState;
 use masseter_runtime::{control::Deadline, named::PlayedMotion};
 use masseter_scenario::ExpectedVerdict;
 
+use crate::stop_cause::acted_before;
 use crate::{
     breach::Breach, check::Check, check::CheckResult, figures::Figures, played::StoppedBy,
     reference::Disorder,
@@ -109,10 +110,7 @@ impl Shortfall {
     fn of_stated_stop(manifest: &Manifest, figures: &Figures) -> Option<Self> {
         let expect = manifest.scenario.expect.as_ref();
         let is_expected = expect.is_some_and(|expect| expect.accepts(ExpectedVerdict::SafeStop));
-        let is_before = |time_ns| figures.stopped_ns().is_none_or(|stopped_ns| time_ns <= stopped_ns);
-        let mut struck = figures.faults.iter().filter_map(|fault| fault.struck_ns);
-        let mut stimuli = figures.events.iter().filter(|event| event.cause == Cause::StimulusBegan);
-        let has_cause = struck.any(is_before) || stimuli.any(|stimulus| is_before(stimulus.time_ns));
+        let has_cause = acted_before(manifest, figures, figures.stopped_ns().unwrap_or(u64::MAX));
         let is_proved = has_cause || has_judged_truth(figures) || !manifest.is_of_program();
         (is_expected && !is_proved).then_some(Self::OnlyStated)
     }

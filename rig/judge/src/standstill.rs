@@ -28,6 +28,9 @@ pub struct StandstillFigures {
     pub jaw_mm: Option<f64>,
     /// The largest angle of the platform, degrees.
     pub jaw_deg: Option<f64>,
+    /// The largest way of the incisal point, mm, and angle of the platform, degrees, once the brakes have had the time to close.
+    #[serde(skip)]
+    pub settled: [f64; 2],
     /// When a way was first beyond its limit.
     #[serde(skip)]
     pub first: Option<Breach>,
@@ -35,6 +38,8 @@ pub struct StandstillFigures {
 
 /// Longest time from the stop to the loss of power; a drive that is not heard of says nothing of its power, ns.
 const POWER_OFF_WITHIN_NS: u64 = 100 * MILLISECOND_NS;
+/// From the stop until an axis that ran into its brake stands, ns.
+const SETTLED_NS: u64 = 150 * MILLISECOND_NS;
 /// Share of the time after the stop that must be recorded: a plant that loses cycles records a little less.
 const LEAST_SHARE: f64 = 0.9;
 
@@ -61,6 +66,8 @@ struct Stop {
     /// Where each axis must stay, m.
     places_m: [Option<f64>; AXES],
     jaw: Option<Pose>,
+    /// Where the jaw was once it must have settled.
+    settled: Option<Pose>,
 }
 
 impl StandstillWatch {
@@ -102,6 +109,12 @@ impl StandstillWatch {
             let StandstillFigures { jaw_mm, jaw_deg, .. } = &mut self.figures;
             *jaw_mm = Some(worse(jaw_mm.unwrap_or(0.0), moved.incisal_m * 1e3));
             *jaw_deg = Some(worse(jaw_deg.unwrap_or(0.0), moved.angle_rad.to_degrees()));
+            if since_ns >= SETTLED_NS {
+                let moved = Deviation::between(&pose, stop.settled.get_or_insert(pose), self.incisal_m);
+                let [mm, deg] = &mut self.figures.settled;
+                *mm = worse(*mm, moved.incisal_m * 1e3);
+                *deg = worse(*deg, moved.angle_rad.to_degrees());
+            }
         }
         self.figures.note_breach(*time_ns, &self.limits);
     }
@@ -113,7 +126,7 @@ impl StandstillWatch {
             self.stop = None;
         } else if self.is_at_work {
             let (off_ns, places_m) = ([None; AXES], [None; AXES]);
-            self.stop = Some(Stop { began_ns: time_ns, off_ns, places_m, jaw: None });
+            self.stop = Some(Stop { began_ns: time_ns, off_ns, places_m, jaw: None, settled: None });
             self.figures.recorded_s = Some(0.0);
         }
         self.is_at_work = is_at_work;

@@ -11,7 +11,7 @@ use serde::Serialize;
 use crate::breach::{Breach, earliest};
 use crate::check::{Check, CheckResult, Subject};
 use crate::outcome::{
-    Outcome, OutcomeReason, account, clock_jump, declared_cause, ending, excuse, incomplete, overload,
+    Outcome, OutcomeReason, account, clock_jump, declared_in_words, ending, excuse, incomplete, overload,
     passed, stopped_by_stimulus, when_died, with_shortfall,
 };
 use crate::timing::{Timing, TimingWord};
@@ -69,7 +69,7 @@ impl Verdict {
         let (beside, checks): (Vec<_>, Vec<_>) = all.iter().cloned().partition(is_beside);
         let excuse = excuse(manifest, figures, &timing);
         let is_too_late = figures.path_breach.first.is_some();
-        let declared = declared_cause(&manifest.scenario, figures);
+        let declared = declared_in_words(manifest, figures);
         let (mut outcome, mut reason) =
             ending(&manifest.ending, figures.stopped_by, declared, &figures.events)
                 .map(|(ending, reason)| match ending {
@@ -93,7 +93,7 @@ impl Verdict {
                         .map(|failure| clock_jump(&manifest.usage, &manifest.scenario.can).unwrap_or(failure))
                 })
                 .or_else(|| untested(&checks, figures.cycles))
-                .unwrap_or_else(|| (Outcome::Named(Pass), passed(manifest, &figures.motion)));
+                .unwrap_or_else(|| (Outcome::Named(Pass), passed(manifest, figures)));
         if let Some(expect) = expect {
             (outcome, reason) = against(expect, (outcome, reason), [&checks, &beside], figures);
         }
@@ -210,16 +210,18 @@ fn against(
     if let Some(other) = other_failures(expect, [checks, beside]) {
         return other;
     }
-    // A fault or stimulus that did not act shows nothing, whatever is expected. The rig's own checks still count where the run
-    // goes on in order to its end.
+    // A fault or stimulus that did not act shows nothing, whatever is expected. The rig's own checks still count, also those of
+    // the motion until a process died or the recording ended. What they leave unrecorded follows from the expected end.
     let own = || {
         let is_in_order = matches!(ending, SafeStop | Interrupted);
-        let short = || incomplete(figures).or_else(|| failed(checks));
+        let follows = |check: &&Check| !is_in_order && check.subject == Subject::Recording;
+        let function: Vec<_> = checks.iter().filter(|check| !follows(check)).cloned().collect();
+        let short = is_in_order.then(|| incomplete(figures)).flatten();
         let counts =
             |check: &&Check| is_of_scenario(check) || (is_in_order && check.subject == Subject::Sequence);
         let idle: Vec<_> = checks.iter().filter(counts).cloned().collect();
-        let in_order = is_in_order.then(short).flatten();
-        in_order.or_else(|| untested(&idle, figures.cycles))
+        let failed = || if ending == Fail { None } else { failed(&function) };
+        short.or_else(failed).or_else(|| untested(&idle, figures.cycles))
     };
     let lost = || {
         let names = named(beside, CheckResult::Excused)?;

@@ -130,6 +130,17 @@ impl StimulusConfig {
         self.stop || self.parameter.is_some()
     }
 
+    /// Whether it pushes without a force and a torque, or adds no mass.
+    pub fn changes_nothing(&self) -> bool {
+        let is_zero =
+            |vector: Option<[f64; 3]>| vector.is_none_or(|vector| vector.iter().all(|number| *number == 0.0));
+        match self.what() {
+            Some("push") => self.push_table.is_none() && is_zero(self.push_n) && is_zero(self.torque_n_m),
+            Some("payload") => self.payload.is_some_and(|payload| payload.si() == 0.0),
+            _ => false,
+        }
+    }
+
     /// The time of the stimulus.
     ///
     /// # Errors

@@ -21,7 +21,7 @@ mod check {
 }
 
 mod motion_checks {
-    use masseter_scenario::BusFault;
+    use masseter_scenario::{BusFault, StimulusConfig};
 
     use super::*;
 
@@ -103,6 +103,10 @@ mod motion_checks {
         }
     }
 
+    fn with(faults: Vec<FaultConfig>) -> Scenario {
+        Scenario { faults, ..Scenario::default() }
+    }
+
     fn figures(number: usize, struck_ns: Option<u64>, deviation_mm: f64) -> FaultFigures {
         FaultFigures { number, struck_ns, deviation_mm, deviation_deg: 0.1, detection: None }
     }
@@ -119,11 +123,11 @@ mod motion_checks {
         for (declared, expected) in cases {
             let found: Vec<_> =
                 (1..=declared).map(|number| figures(number, (number == 1).then_some(5), 0.0)).collect();
-            let check = faults(&vec![fault(); declared], &found, &ChecksConfig::default(), None, [None; 2]);
+            let check = faults(&with(vec![fault(); declared]), &found, &[1, 2, 3], None, [None; 2]);
             assert_eq!(check.map(|check| (check.result.mark(), check.finding)), expected);
         }
         let found = [figures(1, None, 0.0), figures(2, Some(5), 0.6)];
-        let check = faults(&[fault(), fault()], &found, &ChecksConfig::default(), None, [None; 2]).unwrap();
+        let check = faults(&with(vec![fault(), fault()]), &found, &[1, 2], None, [None; 2]).unwrap();
         assert_eq!(check.result.mark(), "FAIL", "one fault led the jaw too far: {check:?}");
     }
 
@@ -132,7 +136,7 @@ mod motion_checks {
         let finding = |fault: FaultConfig| {
             let lasted_s = [Some(9.8104), Some(11.3)];
             let found = [figures(1, None, 0.0)];
-            faults(&[fault], &found, &ChecksConfig::default(), None, lasted_s).unwrap().finding
+            faults(&with(vec![fault]), &found, &[1], None, lasted_s).unwrap().finding
         };
         let never = "0 of 1 declared faults acted, number 1 never: ";
         let late = "0 of 1 declared faults acted, number 1 at 12 s, after the run's end at ";
@@ -151,40 +155,89 @@ mod motion_checks {
     fn a_fault_that_strikes_after_the_stop_tested_nothing_unless_it_waits_for_it() {
         let stopped = |struck_ns, after: Option<&str>| {
             let fault = FaultConfig { after: after.map(str::to_owned), ..fault() };
-            let check = faults(
-                &[fault],
-                &[figures(1, Some(struck_ns), 0.0)],
-                &ChecksConfig::default(),
-                Some(5),
-                [None; 2],
-            );
+            let chain = Scenario { stimulus: chain(), ..with(vec![fault]) };
+            let check = faults(&chain, &[figures(1, Some(struck_ns), 0.0)], &[1], Some(5), [None; 2]);
             check.map(|check| (check.result.mark(), check.finding)).unwrap()
         };
         assert_eq!(stopped(5, None).0, "ok", "it began the stop");
         let late = "0 of 1 declared faults acted, number 1 only after the rig had stopped";
         assert_eq!(stopped(6, None), ("UNTESTED", late.to_owned()));
         assert_eq!(stopped(6, Some("stimulus.knock")).0, "UNTESTED");
-        assert_eq!(stopped(6, Some("controller.safe_stop")).0, "ok");
+        assert_eq!(stopped(6, Some("stimulus.early")).0, "UNTESTED");
+        for after in ["controller.safe_stop", "controller.disabling", "stimulus.stop", "stimulus.behind"] {
+            assert_eq!(stopped(6, Some(after)).0, "ok", "{after}");
+        }
+    }
+
+    /// An early push, an operator's stop, and a push behind it.
+    fn chain() -> Vec<StimulusConfig> {
+        let push = |name: &str, after: Option<&str>| StimulusConfig {
+            name: Some(name.to_owned()),
+            after: after.map(str::to_owned),
+            push_n: Some([0.0, 0.0, 1.0]),
+            ..StimulusConfig::at(0.1)
+        };
+        let stop = StimulusConfig { stop: true, ..StimulusConfig::at(0.2) };
+        vec![push("early", None), stop, push("behind", Some("stimulus.stop"))]
+    }
+
+    #[test]
+    fn a_stimulus_that_never_began_began_too_late_or_changes_nothing_tested_nothing() {
+        let stopped = |stimulus: Vec<StimulusConfig>, began_ns: &[Option<u64>]| {
+            let check = stimuli(&Scenario { stimulus, ..Scenario::default() }, began_ns, Some(5)).unwrap();
+            (check.result.mark(), check.finding)
+        };
+        assert_eq!(stopped(chain(), &[Some(4), Some(5), Some(6)]), ("ok", "3 of 3 stimuli began".to_owned()));
+        let found = [
+            (
+                stopped(chain(), &[Some(6), Some(5), None]),
+                "2 of 3 stimuli began, number 3 never: let the stimulus begin earlier, or play longer, number 1 only after the rig had stopped",
+            ),
+            (
+                stopped(
+                    vec![StimulusConfig { push_n: Some([0.0; 3]), ..StimulusConfig::at(0.1) }],
+                    &[Some(1)],
+                ),
+                "1 of 1 stimuli began, number 1 without a force or a mass",
+            ),
+            (
+                stopped(
+                    vec![StimulusConfig {
+                        payload: Some("0 kg".parse().unwrap()),
+                        ..StimulusConfig::at(0.1)
+                    }],
+                    &[Some(1)],
+                ),
+                "1 of 1 stimuli began, number 1 without a force or a mass",
+            ),
+        ];
+        for (found, expected) in found {
+            assert_eq!(found, ("UNTESTED", expected.to_owned()));
+        }
+        assert!(stimuli(&Scenario::default(), &[], Some(5)).is_none());
     }
 
     #[test]
     fn a_fault_that_leads_the_jaw_beyond_the_limit_fails_the_run_with_its_name() {
         for (deviation_mm, mark) in [(0.5, "ok"), (0.51, "FAIL")] {
             let found = [figures(1, Some(5), deviation_mm)];
-            let check = faults(&[fault()], &found, &ChecksConfig::default(), None, [None; 2]).unwrap();
+            let check = faults(&with(vec![fault()]), &found, &[1], None, [None; 2]).unwrap();
             assert_eq!(check.result.mark(), mark, "{check:?}");
             let named = "number 1, lose (bus 1, node 4, id 204h), moved the jaw 0.510 mm and 0.100° from its path \
                          undetected, limit 0.5 mm and 0.5°";
             assert_eq!(check.finding.contains(named), mark == "FAIL", "{check:?}");
         }
+        let found = [figures(1, Some(5), 9.0), figures(2, Some(7), 9.0)];
+        let both = faults(&with(vec![fault(), fault()]), &found, &[1], None, [None; 2]).unwrap();
+        assert!(both.finding.contains("number 1, ") && !both.finding.contains("number 2, "), "{both:?}");
         let turned = FaultFigures { deviation_deg: 0.5, ..figures(1, Some(5), 0.1) };
-        let check = faults(&[fault()], &[turned], &ChecksConfig::default(), None, [None; 2]).unwrap();
+        let check = faults(&with(vec![fault()]), &[turned], &[1], None, [None; 2]).unwrap();
         assert_eq!(check.result.mark(), "ok", "{check:?}");
         for deviation_deg in [0.51, f64::INFINITY, f64::NAN] {
             let turned = FaultFigures { deviation_deg, ..figures(1, Some(5), 0.1) };
             let shifted = FaultFigures { deviation_mm: deviation_deg, ..figures(1, Some(5), 0.1) };
             for found in [turned, shifted] {
-                let check = faults(&[fault()], &[found], &ChecksConfig::default(), None, [None; 2]).unwrap();
+                let check = faults(&with(vec![fault()]), &[found], &[1], None, [None; 2]).unwrap();
                 assert_eq!(check.result.mark(), "FAIL", "{check:?}");
             }
         }

@@ -1,8 +1,10 @@
 use masseter_runtime::messages::Event;
+use masseter_runtime::messages::codes::EventKind;
 
 use super::*;
-use crate::events::Code;
-use masseter_recording::Usage;
+use crate::{SignalFigures, events::Code};
+use masseter_recording::{MachineInfo, Usage};
+use masseter_runtime::named::Signal;
 
 #[test]
 fn a_safe_stop_is_explained_by_what_went_wrong_first() {
@@ -118,4 +120,39 @@ fn the_exit_codes_of_scenarios_are_those_of_the_program() {
         assert_eq!(Outcome::Named(expected).word_and_exit().1 as u8, expected.exit_code(), "{expected:?}");
     }
     assert_eq!((Outcome::Invalid.named(), Outcome::ChecksFailed.named()), (None, Some(Fail)));
+}
+
+#[test]
+fn a_pass_says_what_of_the_bite_force_never_was() {
+    let machine = MachineInfo { cpu: "any".into(), cores: 2, kernel: "Linux".into(), is_virtual: false };
+    let manifest = Manifest::new("0.1.0", Scenario::default(), 10.0, "virtual", machine);
+    let signal = |(name, values, max): &(&str, u64, f64)| {
+        let (name, unit, about) = ((*name).to_owned(), String::new(), String::new());
+        let max = (*values > 0).then_some(*max);
+        let (signal, not_finite) = (Signal { name, unit, about }, 0);
+        SignalFigures { signal, values: *values, not_finite, min: max, mean: max, max, last: max }
+    };
+    let passes = |signals: &[(&str, u64, f64)]| {
+        let signals = signals.iter().map(signal).collect();
+        passed(&manifest, &Figures { signals, ..Figures::default() })
+    };
+    let [estimate, bite] = [("bite_force_n", 9, 20.0), ("force_phase", 9, 1.0)];
+    let all = [estimate, bite, ("probed_stiffness_n_per_m", 9, 4e3)];
+    assert_eq!(passes(&[]), "every check passed");
+    assert_eq!(passes(&all), "every check passed");
+    for (signals, said) in [
+        (vec![("bite_force_n", 0, 0.0), ("force_phase", 9, 0.0)], "the bite force was never estimated: "),
+        (vec![estimate, ("force_phase", 9, 0.0)], "the bite force was never controlled: "),
+        (
+            vec![estimate, bite, ("probed_stiffness_n_per_m", 9, 0.0)],
+            "no probe of the stiffness came to its end: ",
+        ),
+    ] {
+        let found = passes(&signals);
+        assert!(found.starts_with(&format!("every check passed; {said}")), "{found}");
+    }
+    let signals = vec![signal(&("force_phase", 9, 0.0))];
+    let figures = Figures { signals, ..Figures::default() };
+    let of_law = Manifest { controller: Some("python3 law.py".to_owned()), ..manifest };
+    assert_eq!(passed(&of_law, &figures), "every check passed", "a law of a user controls in another way");
 }

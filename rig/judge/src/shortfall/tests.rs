@@ -2,7 +2,7 @@ use std::path::Path;
 
 use masseter_recording::MachineInfo;
 use masseter_runtime::messages::Event;
-use masseter_runtime::messages::codes::{EventKind, Source};
+use masseter_runtime::messages::codes::{Cause, EventKind, Source};
 use masseter_runtime::named::Declared;
 use masseter_scenario::Scenario;
 
@@ -258,6 +258,14 @@ fn an_expected_safe_stop_needs_more_than_the_controllers_word() {
     for (number, (change, expected)) in cases.into_iter().enumerate() {
         assert_eq!(stopped(expect, change), expected, "case {number}");
     }
+    let long_over = |figures: &mut Figures| {
+        strike(figures, Some(1));
+        figures.stop_without_event_ns = Some(800_000_000);
+        let ended = Event::new(Source::Wire, EventKind::Notice, Cause::FaultEnded);
+        let ended = Event { time_ns: 100_000_000, value: 1.0, ..ended };
+        figures.events.push(EventRecord::from(&ended));
+    };
+    assert_eq!(stopped(expect, long_over), Some(Shortfall::OnlyStated), "the fault had ended long before");
     assert_eq!(result(Shortfall::OnlyStated), CheckResult::Untested);
     assert_eq!(stopped("", |_| ()), None, "such a stop is no pass anyway");
 }

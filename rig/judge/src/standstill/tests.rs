@@ -68,6 +68,15 @@ fn a_fall_a_drift_and_a_jaw_that_comes_back_fail() {
 }
 
 #[test]
+fn a_jaw_that_runs_into_its_brakes_settles_and_one_that_falls_does_not() {
+    let scenario = Scenario::default();
+    let braked = stopped(&scenario, |ms| ms.clamp(120, 160) as f64);
+    assert_eq!((mark(&braked), braked.settled), ("FAIL", [0.0; 2]));
+    let fallen = stopped(&scenario, |ms| ms.max(120) as f64);
+    assert!(mark(&fallen) == "FAIL" && fallen.settled[0] > 400.0, "{fallen:?}");
+}
+
+#[test]
 fn axes_may_coast_for_the_time_that_the_scenario_declares() {
     let coasting = |ms: u64| ms.min(150) as f64;
     let mut scenario = Scenario::default();

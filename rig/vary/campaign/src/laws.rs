@@ -145,10 +145,16 @@ impl Run<'_> {
         let is_let_go = self.storm.faults.iter().any(|fault| moves_on(fault.kind));
         // Pressed against its stops, the jaw gives way as the drives let go.
         let is_pressed = self.left_path().is_some() && self.has_undetected();
-        let is_excused = is_let_go
-            || is_pressed
-            || self.figures.faults.iter().any(|fault| was_detected_late(fault, &self.storm.checks));
+        let was_late = self.figures.faults.iter().any(|fault| was_detected_late(fault, &self.storm.checks));
+        let is_excused = is_let_go || ((is_pressed || was_late) && self.has_settled());
         (check.result == CheckResult::Failed && !is_excused).then(|| check.finding.clone())
+    }
+
+    /// Whether the jaw stood once its axes had run into their brakes: no late detection excuses a fall.
+    fn has_settled(&self) -> bool {
+        let ChecksConfig { standstill_jaw_mm, standstill_jaw_deg, .. } = self.storm.checks;
+        let [mm, deg] = self.figures.standstill.settled;
+        mm <= standstill_jaw_mm && deg <= standstill_jaw_deg
     }
 
     fn incomplete(&self) -> Option<String> {
@@ -172,8 +178,10 @@ impl Run<'_> {
             .filter_map(|(fault, FaultFigures { struck_ns, .. })| Some((fault, (*struck_ns)?)))
     }
 
+    /// An emergency without an error is no report of a deviation.
     fn is_reported(&self) -> bool {
-        self.figures.events.iter().any(|event| event.kind == EventKind::Fault)
+        let mut faults = self.figures.events.iter().filter(|event| event.kind == EventKind::Fault);
+        faults.any(|event| !event.is_without_error())
     }
 }
 

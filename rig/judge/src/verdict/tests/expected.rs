@@ -53,12 +53,45 @@ fn the_expected_outcome_passes_and_any_other_fails() {
         ("FAIL", "expected SAFE STOP, but PASS: every check of the rig passed".to_owned())
     );
 
-    let mut died = Run::new();
-    died.manifest.ending = Ending::died("plant", "signal 9".to_owned());
-    expect(&mut died, ExpectedVerdict::Died);
+    let mut died = died();
     assert_eq!(judge(&died).0, "PASS");
     expect(&mut died, ExpectedVerdict::SafeStop);
     assert_eq!(judge(&died).0, "FAIL");
+}
+
+fn died() -> Run {
+    let mut died = Run::new();
+    died.manifest.ending = Ending::died("plant", "signal 9".to_owned());
+    expect(&mut died, ExpectedVerdict::Died);
+    died
+}
+
+/// An axis moves after the stop.
+fn fall(run: &mut Run) {
+    run.figures.standstill.recorded_s = Some(0.5);
+    run.figures.standstill.axes_mm[3] = 20.0;
+}
+
+#[test]
+fn an_expected_death_or_lost_recording_excuses_what_is_not_recorded_and_no_other_check() {
+    let unwritten = || {
+        let mut run = Run::new();
+        run.manifest.ending = Ending::RecordingFailed;
+        expect(&mut run, ExpectedVerdict::Incomplete);
+        run
+    };
+    let cases: [(Change, &str); 4] = [
+        (|_| (), "PASS"),
+        (|run| run.lose(5), "PASS"),
+        (|run| run.figures.tracking.actual.max_mm = Some(0.6), "FAIL"),
+        (fall, "FAIL"),
+    ];
+    for (number, (change, word)) in cases.into_iter().enumerate() {
+        for mut run in [died(), unwritten()] {
+            change(&mut run);
+            assert_eq!(judge(&run).0, word, "case {number}: {}", judge(&run).1);
+        }
+    }
 }
 
 #[test]
