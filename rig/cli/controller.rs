@@ -132,7 +132,7 @@ fn describe(Parameter { name, unit, about, value, range: [least, most] }: &Param
     after_help = "Examples:\n  masseter signals | grep incisal\n  masseter signals --controller hold | grep '^signal'"
 )]
 pub(super) struct SignalsArgs {
-    /// Scenario file [default: ten seconds of chewing]
+    /// Scenario file [default: the built-in scenario, ten seconds of chewing]
     scenario: Option<PathBuf>,
     /// Whose own signals and parameters are listed too: motion, hold, or a program, which is started and left before the
     /// first cycle [default: motion]

@@ -22,7 +22,7 @@ pub(super) enum FaultsVerb {
 /// The arguments of `faults matrix`.
 #[derive(Debug, Clone, Args)]
 pub(super) struct MatrixArgs {
-    /// Scenario file [default: chewing]
+    /// Scenario file [default: the built-in scenario]
     scenario: Option<PathBuf>,
     /// Folder for matrix.csv and matrix.svg; must not exist
     #[arg(long, value_name = "DIR", default_value = "faults")]

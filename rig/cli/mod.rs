@@ -127,7 +127,7 @@ enum Verb {
     #[command(subcommand, alias = "log", after_help = "Example:\n  masseter recording info runs/latest")]
     Recording(masseter_recording_verbs::RecordingVerb),
     /// Plan the buses, describe the drives (EDS, DBC), serve simulated buses
-    #[command(subcommand, after_help = "Example:\n  masseter can plan --rate-hz 1500")]
+    #[command(subcommand, after_help = "Example:\n  masseter can plan --rate-hz 500")]
     Can(can::CanVerb),
     /// Remove what killed runs left in shared memory
     #[command(after_help = "Example:\n  masseter clean")]

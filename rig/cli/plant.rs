@@ -12,7 +12,7 @@ use crate::prelude::*;
 #[derive(Debug, Clone, Args)]
 #[command(after_help = "Example:\n  masseter plant --emulate --can can0,can1")]
 pub(super) struct PlantArgs {
-    /// Scenario file with drives and mechanism [default: the published rig]
+    /// Scenario file with drives and mechanism [default: the built-in scenario]
     #[arg(value_name = "SCENARIO")]
     file: Option<PathBuf>,
     /// CAN interface of each bus, such as can0,can1

@@ -10,7 +10,7 @@ use crate::vary::storm::{self, Limits, Season};
     after_help = "Examples:\n  masseter storm --seed 7\n  masseter storm chewing.toml --seed 7 --minutes 60 --out storms/7\n\nThe same command with the same --out goes on where it was."
 )]
 pub(super) struct StormArgs {
-    /// The scenario that the storms change [default: the built-in one]
+    /// The scenario that the storms change [default: the built-in scenario]
     scenario: Option<PathBuf>,
     /// The seed of all storms
     #[arg(long, default_value_t = 1)]

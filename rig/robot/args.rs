@@ -12,7 +12,7 @@ use crate::cli::arguments::{Wires, parse_wires};
 /// Robot and evidence.
 #[derive(Debug, Clone, Args)]
 pub(crate) struct RobotArgs {
-    /// Scenario file [default: the published rig]
+    /// Scenario file [default: the built-in scenario]
     scenario: Option<PathBuf>,
     /// Simulated buses, or the CAN interface of each bus, such as can0,can1
     #[arg(long, value_name = "virtual|IF[,IF]", value_parser = parse_wires)]

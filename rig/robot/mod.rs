@@ -43,7 +43,7 @@ pub(crate) enum RobotVerb {
     /// Home the axes, one after the other: the legs first
     #[command(after_help = "Examples:\n  masseter robot home\n  masseter robot home --axis l1")]
     Home(args::AxesArgs),
-    /// Check whether the axes tell the closed pose
+    /// Check whether the positions of the axes give the closed pose
     CheckPose(check_pose::CheckPoseArgs),
     /// Show which steps are done, and which is next
     Status(status::StatusArgs),

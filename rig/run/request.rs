@@ -32,10 +32,10 @@ const KEEP: &str = "Keep the result";
 )]
 #[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(crate) struct RunRequest {
-    /// Scenario file [default: ten seconds of chewing]
+    /// Scenario file [default: the built-in scenario, ten seconds of chewing]
     pub(super) scenario: Option<PathBuf>,
-    /// Recorded jaw motion (CSV), instead of the scenario's motion
-    #[arg(long, value_name = "FILE.csv", help_heading = WHAT)]
+    /// Recorded jaw motion (CSV, TRC, MOT, STO or C3D), instead of the scenario's motion
+    #[arg(long, value_name = "FILE", help_heading = WHAT)]
     pub(super) trajectory: Option<PathBuf>,
     /// Duration of the motion in seconds, or with a unit, such as 10, 10s or 2min
     #[arg(long, value_name = "TIME", value_parser = parse_duration, allow_negative_numbers = true, help_heading = WHAT)]

@@ -21,7 +21,7 @@ pub(crate) enum CanVerb {
     /// Print the electronic data sheet (EDS, CiA 306) of a drive
     #[command(after_help = "Example:\n  masseter can eds --axis l1 > l1.eds")]
     Eds {
-        /// Scenario file with the drives [default: the published rig]
+        /// Scenario file with the drives [default: the built-in scenario]
         scenario: Option<PathBuf>,
         /// Axis of the drive
         #[arg(long, default_value = "d1", value_parser = PossibleValuesParser::new(AXIS_NAMES).map(|name| axis_of(&name)))]
@@ -30,7 +30,7 @@ pub(crate) enum CanVerb {
     /// Print the messages of the link as a DBC file
     #[command(after_help = "Example:\n  masseter can dbc > masseter.dbc")]
     Dbc {
-        /// Scenario file with the drives [default: the published rig]
+        /// Scenario file with the drives [default: the built-in scenario]
         scenario: Option<PathBuf>,
     },
     /// Serve the simulated buses and drives to other tools (socketcand protocol)
@@ -39,9 +39,9 @@ pub(crate) enum CanVerb {
 
 /// The arguments of `can plan`.
 #[derive(Debug, Clone, Args)]
-#[command(after_help = "Example:\n  masseter can plan --rate-hz 1500")]
+#[command(after_help = "Example:\n  masseter can plan --rate-hz 500")]
 pub(crate) struct PlanArgs {
-    /// Scenario file with the buses [default: the published rig]
+    /// Scenario file with the buses [default: the built-in scenario]
     scenario: Option<PathBuf>,
     /// Cycles per second
     #[arg(long)]

@@ -46,7 +46,7 @@ Examples:
   python3 -c 'import can; \
 can.Bus(interface=\"socketcand\", host=\"127.0.0.1\", port=29536, channel=\"can0\")'")]
 pub(crate) struct ServeArgs {
-    /// Scenario file with buses and drives [default: the published rig]
+    /// Scenario file with buses and drives [default: the built-in scenario]
     scenario: Option<PathBuf>,
     /// Port of this machine, or address, to listen on; every client that reaches it can move the emulated drives
     #[arg(long, value_name = "PORT|ADDR:PORT", default_value = "127.0.0.1:29536", value_parser = parse_address)]

@@ -26,7 +26,7 @@ pub(crate) struct CsvArgs {
     /// CSV file to read [default: standard input]
     #[arg(long, value_name = "FILE.csv")]
     input: Option<PathBuf>,
-    /// Scenario with the mechanism [default: the published one]
+    /// Scenario with the mechanism [default: the built-in scenario]
     #[arg(long, value_name = "SCENARIO.toml")]
     scenario: Option<PathBuf>,
 }

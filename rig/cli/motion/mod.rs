@@ -25,7 +25,7 @@ Examples:
 pub(crate) struct MotionArgs {
     /// File of a recorded jaw motion, as for run --trajectory
     file: PathBuf,
-    /// Scenario with the file's axes, the jaw and the mechanism [default: the default one]
+    /// Scenario with the file's axes, the jaw and the mechanism [default: the built-in scenario]
     #[arg(long, value_name = "SCENARIO.toml")]
     scenario: Option<PathBuf>,
     /// Set a key of the scenario

@@ -70,7 +70,7 @@ struct StudyArgs {
     /// Cells along each side of a map
     #[arg(long, value_name = "N", default_value_t = 160, value_parser = clap::value_parser!(u32).range(2..=1000))]
     cells: u32,
-    /// Recorded jaw motion (CSV of poses or markers) to judge as well
+    /// Recorded jaw motion (CSV, TRC, MOT, STO or C3D) to judge as well
     #[arg(long, value_name = "FILE.csv")]
     trajectory: Option<PathBuf>,
     /// Scenario with a motion to judge as well; for a recording its axes, jaw and limits

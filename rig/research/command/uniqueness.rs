@@ -36,11 +36,11 @@ pub(crate) struct ProveArgs {
     /// Instead of a region: all inputs within this distance, in each axis, of the inputs of a motion
     #[arg(long, value_name = "MM", conflicts_with = "region", value_parser = parse_distance)]
     around_mm: Option<f64>,
-    /// Scenario with the motion [default: ten seconds of chewing]
+    /// Scenario with the motion [default: the built-in scenario, ten seconds of chewing]
     #[arg(long, value_name = "FILE.toml", requires = "around_mm")]
     scenario: Option<PathBuf>,
-    /// Recorded jaw motion (CSV) instead of the scenario's motion
-    #[arg(long, value_name = "FILE.csv", requires = "around_mm")]
+    /// Recorded jaw motion (CSV, TRC, MOT, STO or C3D) instead of the scenario's motion
+    #[arg(long, value_name = "FILE", requires = "around_mm")]
     trajectory: Option<PathBuf>,
     /// Boxes to examine at most
     #[arg(long, value_name = "N", default_value_t = 100_000)]

@@ -272,7 +272,7 @@ section! {
     /// What the recording of a run contains.
     #[derive(Copy, Eq)]
     pub struct RecordingConfig {
-        /// Record the CAN frames. Without them a recording is a tenth smaller; the check `bus response` is not judged,
+        /// Record the CAN frames. Without them a recording is a seventh smaller; the check `bus response` is not judged,
         /// and reports, exports and `masseter diff` say that the frames are not recorded. Runs without a recording do
         /// not judge the check either.
         pub frames: bool = true,
