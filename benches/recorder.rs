@@ -1,10 +1,10 @@
-//! What recording costs: every topic at 10 kHz through the real recorder, beside a raw write of the same
+//! The cost of recording: every topic at 10 kHz through the real recorder, beside a raw write of the same
 //! bytes.
 //!
 //!     cargo bench --bench recorder
 //!
-//! The messages are those of a run under virtual time, played again and again at the pace of the clock by a thread with
-//! the real time of a run.
+//! A thread with the real time of a run plays the messages of a run under virtual time again and again, at the pace of the
+//! clock.
 
 use std::fs::{self, File};
 use std::io::{BufRead, BufReader, Write};

@@ -1,5 +1,5 @@
 //! The architecture's rules on dependencies. Crates keep their layers, and the files of a crate have no circle of
-//! imports. An inherent impl of a type stands in the file that defines the type. Every file belongs to a module.
+//! imports. An inherent impl of a type is in the file that defines the type. Every file belongs to a module.
 //!
 //! A file imports another file of its crate when a path in a `use` or in its code leads to an item of that file. A
 //! re-export of a file below (`mod child; pub use child::Item;`) is no import, and a path through a re-export leads to

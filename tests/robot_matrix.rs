@@ -2,7 +2,7 @@
 //! docs/robot.md. `cargo test --test rig -- --ignored renew_the_tables_of_the_robot` plays everything and writes the tables anew.
 //!
 //! Each step plays, also those after the one that finds the quirk. The log of every step shows that no second axis ever had power,
-//! and that `inspect` only asks.
+//! and that `inspect` only reads.
 
 use std::collections::BTreeMap;
 use std::fs;

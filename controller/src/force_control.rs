@@ -8,7 +8,7 @@
 //! teeth, and with the stiffness that the bite shows. A bite ends after its time, at a break of the food, or when the opening motion reaches the jaw. After that
 //! the jaw does not close. The jaw waits, gives way to more than the force of contact, and follows the motion again
 //! when the motion opens. As an option, the lateral position follows the same admittance in a bite, towards a lateral
-//! force in proportion to the desired bite force. All other freedoms keep to the motion. Limit of stability:
+//! force in proportion to the desired bite force. All other freedoms follow the motion. Limit of stability:
 //! `docs/dynamics-control.md`.
 
 mod bite;

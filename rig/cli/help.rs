@@ -1,4 +1,4 @@
-//! Help: the overview of all verbs, grouped by what a user wants; `masseter completions` and `masseter man`. All of
+//! Help: the overview of all verbs, grouped by purpose; `masseter completions` and `masseter man`. All of
 //! it is made from the definition of the command line.
 
 use std::fmt::Write;

@@ -1,4 +1,4 @@
-//! The controller as the supervisor sees it: the rig's own process, a [program](Program) of the user, or none.
+//! The controller from the side of the supervisor: the rig's own process, a [program](Program) of the user, or none.
 
 use std::{ffi::OsString, io, os::fd::OwnedFd};
 

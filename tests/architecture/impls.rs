@@ -1,4 +1,4 @@
-//! Inherent impls: a type's methods stand in the file that defines it, so no other file has access to its private state.
+//! Inherent impls: a type's methods are in the file that defines it, so no other file has access to its private state.
 
 use std::path::Path;
 

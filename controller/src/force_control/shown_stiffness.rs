@@ -2,7 +2,7 @@
 //!
 //! Height and force pass the same high-pass, whose time constant is the delay of the loop: what is left are the
 //! frequencies at which the loop can shake. The doubt in a change of force is taken off; an error beyond the doubt shows as
-//! stiffness, and the bite is slower. This module changes no damping and knows no food.
+//! stiffness, and the bite is slower. This module changes no damping and has no foods.
 
 /// Least change of height that shows a stiffness, m: more than encoders and drives deviate.
 const LEAST_M: f64 = 4e-6;

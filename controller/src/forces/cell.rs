@@ -1,4 +1,4 @@
-//! The load cell beside the observer: both know the bite force, each with an uncertainty of its own.
+//! The load cell beside the observer: both measure the bite force, each with an uncertainty of its own.
 
 use masseter_scenario::LoadCellConfig;
 

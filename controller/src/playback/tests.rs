@@ -1,4 +1,4 @@
-//! The desired pose moves forward on its path, and comes to rest where it is told to.
+//! The desired pose moves forward on its path, and comes to rest where requested.
 
 use masseter_model::geometry::{MechanismConfig, Vec3};
 use masseter_scenario::JawConfig;

@@ -1,6 +1,6 @@
 //! The meaning of a recording's columns by their names.
 //!
-//! A name counts in any case and with any signs between its words. A unit stands in brackets or at the end.
+//! A name counts in any case and with any signs between its words. A unit is in brackets or at the end.
 
 use super::units::{Quantity, Unit};
 

@@ -1,4 +1,4 @@
-//! A drive with a quirk, a fault of the drive, and a fault of the wire, each as a master sees it:
+//! A drive with a quirk, a fault of the drive, and a fault of the wire, each from the side of the master:
 //! `cargo run --example make_it_fail`.
 
 use std::error::Error;

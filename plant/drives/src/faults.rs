@@ -1,4 +1,4 @@
-//! The injectable faults of a drive. The injector sets the acting faults, and asks for the faults that have struck.
+//! The injectable faults of a drive. The injector sets the acting faults, and reads the faults that have struck.
 
 /// A kind of fault. A kind with a size has it in its own unit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Deserialize)]

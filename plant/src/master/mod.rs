@@ -7,7 +7,7 @@
 //!
 //! The master uses the bus trait alone ([`Buses`]), so simulated and real wires need the same code. SDO takes place
 //! only with drives that exchange no process data. A bus has one request a cycle, queued after the process data. The
-//! heartbeat is the last message of a cycle. So a bus never carries more than the [time
+//! heartbeat is the last message of a cycle. So a bus never has more frames than the [time
 //! table](masseter_runtime::schedule) allows for.
 
 mod boot;

@@ -1,7 +1,7 @@
 //! The objects that the rig needs in a drive, from scenario and profile, in one form for boot, inspection and
 //! configuration.
 //!
-//! This module talks to no drive.
+//! This module sends nothing to a drive.
 
 #[cfg(test)]
 mod tests;

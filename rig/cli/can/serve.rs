@@ -3,7 +3,7 @@
 //! Every client is a node on the bus that it opens: its frames take part in arbitration and reach the drives and the
 //! other clients. No master runs here; a client can be one. A client that reads too slowly first loses frames, then the
 //! connection, and delays no other. On a full bus a new client takes the place of the client whose last request is
-//! the oldest. So idle clients lock nobody out. A client that only listens keeps its place until a new client needs it.
+//! the oldest. So idle clients exclude no others. A client that only listens keeps its place until a new client needs it.
 //! No connection blocks: unsent text waits in a buffer of bounded size.
 
 use std::net::{SocketAddr, TcpListener};

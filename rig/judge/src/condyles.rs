@@ -1,6 +1,6 @@
 //! An estimate of the load of both condyles: the forces on them that would hold the jaw alone, without muscles.
 //!
-//! The jaw is the rigid platform with its mass. Two points cannot bear a moment about the line between them: muscles would,
+//! The jaw is the rigid platform with its mass. Two points cannot take a moment about the line between them: muscles would,
 //! and load the condyles in turn. What the two press against each other along that line is taken as 0. So this is no load of
 //! a human joint; it shows how a bite and the inertia share out between left and right.
 

@@ -2,7 +2,7 @@
 //!
 //! At the same instant of the motion, the filter leads the desired path away from the recorded one, and the robot leads
 //! the jaw away from the desired path. Both add up to the whole error. The clock of a motion starts and stops slowly:
-//! these ramps change no path, and their error is the distance to an even pace. Only rows count, not what lies between.
+//! these ramps change no path, and their error is the distance to an even pace. Only rows count, not the time between.
 //! Not judged: cycles outside the motion, and whether a deviation matters.
 
 use std::sync::Arc;

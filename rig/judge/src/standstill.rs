@@ -1,7 +1,7 @@
-//! Whether the jaw stands after every stop: a safe stop, one by request, the end of the motion, and the loss of power.
+//! Whether the jaw is at rest after every stop: a safe stop, one by request, the end of the motion, and the loss of power.
 //!
-//! A stop begins where not all drives are enabled any more, where the master stops them, or where the controller says that the
-//! motion is over. From then on the way of each axis counts from where its drive lost power, and that of the jaw from where the
+//! A stop begins with the first drive that is no longer enabled, a stop by the master, or the end of the controller's
+//! motion. From then on the way of each axis counts from where its drive lost power, and that of the jaw from where the
 //! last drive lost it: of the true mechanism where it is emulated, otherwise of the encoders.
 
 use masseter_model::geometry::{AXES, AXIS_NAMES, Deviation, Pose};

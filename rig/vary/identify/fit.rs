@@ -1,9 +1,9 @@
 //! Least squares on a model that plays a recording again with noise of its own: values and 95 % intervals.
 //!
-//! The recording's noise cannot be played again. So residuals are those from the mean of some playings with other seeds,
+//! The recording's noise is unknown. So residuals are those from the mean of some playings with other seeds,
 //! and slopes are those of playings without noise. The spread of the sums over blocks of the recording gives the
 //! intervals, so that serial correlation counts. A weak prior, the start with a standard deviation of one scale, bounds
-//! what the recording leaves open. Nothing here knows a rig.
+//! what the recording leaves open. Nothing here depends on a rig.
 
 use nalgebra::{DMatrix, DVector};
 use rayon::iter::{IntoParallelIterator, ParallelIterator};

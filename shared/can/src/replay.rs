@@ -1,6 +1,6 @@
-//! A log as a bus: what one party sent is compared with what it sends now, and gets the answers that it got then.
+//! A log as a bus: the frames that one party sends are compared with those of the log, and get the answers of the log.
 //!
-//! A replay knows neither CANopen nor the nodes that the log is of. It never refuses a frame, and has no error states.
+//! A replay depends neither on CANopen nor on the nodes that the log is of. It never refuses a frame, and has no error states.
 
 use std::collections::VecDeque;
 

@@ -1,3 +1,3 @@
-//! Nothing. The C library and the Python package ask crates of others for other features than the command does. Cargo would
-//! then compile half of these crates once more for each of them. `masseter-runtime` depends on this crate, which asks for all
-//! these features, so that every build of the workspace has the same.
+//! Features of crates of others. The C library and the Python package need other features than the command, and Cargo would compile
+//! half of these crates once more for each. `masseter-runtime` depends on this crate, which lists all features, so that every build of the
+//! workspace has the same.

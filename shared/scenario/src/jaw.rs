@@ -1,6 +1,6 @@
 //! The lower jaw, its teeth, and food between them: `[jaw]`, `[teeth]` and `[food]`.
 //!
-//! The default arch is a parabola through the incisal point and both first molars. Teeth stand along it by their
+//! The default arch is a parabola through the incisal point and both first molars. The teeth follow each other by their
 //! mesiodistal widths. The trajectory checks the ranges of `[jaw]`.
 
 use std::collections::BTreeSet;

@@ -1,6 +1,6 @@
 //! Deviations of emulated drives from the standard: `[[drives.quirk]]`.
 //!
-//! The plant carries a quirk out.
+//! The plant implements the quirks.
 
 use std::fmt::{self, Display, Formatter};
 

@@ -1,6 +1,6 @@
 //! Rows of numbers in CSV of people and programs. Every reader of the rig uses these rules.
 //!
-//! A row is a line. Comments begin with `#`. Names and numbers may stand in quotes. Neither has a comma or the end of a
+//! A row is a line. Comments begin with `#`. Names and numbers may be in quotes. Neither has a comma or the end of a
 //! line, so a quote without its partner is a part of the field.
 
 use std::io::{self, BufRead, Read};

@@ -1,4 +1,4 @@
-//! Late readings, and processes that stand still for a while.
+//! Late readings, and processes that stop for a while.
 
 use super::*;
 

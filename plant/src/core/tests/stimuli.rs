@@ -1,4 +1,4 @@
-//! Stimuli that the plant carries out: pushes on the jaw, food, payload.
+//! Stimuli that act in the plant: pushes on the jaw, food, payload.
 
 use masseter_scenario::{FoodConfig, FrictionModel, Shape, StimulusConfig};
 

@@ -1,6 +1,6 @@
 //! The native part of the Python package `masseter_drives`; the package itself has the documentation.
 //!
-//! This module has no clock: the caller says up to which time, in ns, the drives go on. It has no thread, either; threads of
+//! This module has no clock: the caller gives the time, in ns, up to which the drives go on. It has no thread, either; threads of
 //! Python may share a stand.
 #![allow(clippy::needless_pass_by_value, reason = "Python passes values")]
 

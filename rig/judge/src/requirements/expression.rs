@@ -1,6 +1,6 @@
 //! Expressions of signals, such as `abs({l1.force}) + abs({l2.force})`.
 //!
-//! An expression is read once, into steps that stand in the order of their evaluation. The same steps give the value and
+//! An expression is read once, into steps in the order of their evaluation. The same steps give the value and
 //! the dimension, so the two cannot disagree about priorities.
 
 use std::convert::Infallible;

@@ -1,7 +1,7 @@
 //! Responses: after each trigger, a condition follows within a time and holds for a time.
 //!
 //! A trigger that occurs at t is answered if, for some sample τ of [t + delay, t + within], the condition holds at every sample
-//! of [τ, τ + `stays_for`]. Time to answer, latency and margin count from t, also where t lies between two samples. Both windows
+//! of [τ, τ + `stays_for`]. Time to answer, latency and margin count from t, also where t is between two samples. Both windows
 //! end at the last sample of the run. The robustness of an answer is the largest, over τ, of
 //! the smallest robustness of the condition in its window: the discrete semantics of signal temporal logic.
 

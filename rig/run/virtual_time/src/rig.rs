@@ -3,7 +3,7 @@
 //!
 //! Every step happens exactly when the time table has it, so the same scenario, seed and commands leave the same
 //! bytes. Computing takes no time here: readings and commands go out at the latest times that the time table allows.
-//! Only the buses vary. A rig has no controller and no operator: commands come from outside, and nobody sets
+//! Only the buses vary. A rig has no controller and no operator: commands come from outside, and nothing sets
 //! parameters or requests a stop. A scenario of real interfaces is refused.
 
 #[cfg(test)]

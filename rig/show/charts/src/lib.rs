@@ -1,6 +1,6 @@
 //! Charts as SVG: lines and dots over two axes, with round ticks and one palette.
 //!
-//! Pictures that stand without a browser's scripts are drawn here: figures for print, and recorded motions. Pages draw
+//! Pictures without a browser's scripts are drawn here: figures for print, and recorded motions. Pages draw
 //! themselves (`masseter-page`).
 //!
 //! ```

@@ -3,7 +3,7 @@
 //! The page is a list of sections, and a section a list of blocks. This crate fixes what a block may be and holds the scripts
 //! that draw the blocks in a browser. Which figures the page shows is decided by its users. Nothing is fetched.
 //!
-//! Times in the page's data are seconds since the run's first SYNC; [`Time`] says where the motion began.
+//! Times in the page's data are seconds since the run's first SYNC; [`Time`] is where the motion began.
 //!
 //! ```
 //! use masseter_page::{Block, Chart, Life, Page, Points, Section, Series, Style, Time};

@@ -1,6 +1,6 @@
 //! Standard error, written from a thread of its own, and lines about refused peers that stay few.
 //!
-//! A stopped terminal or a paused reader blocks whoever writes. The recorder must not wait, since it would lose messages,
+//! A stopped terminal or a paused reader blocks the writer. The recorder must not wait, since it would lose messages,
 //! nor the server of the simulated buses, whose drives go on.
 
 use std::sync::atomic::{AtomicUsize, Ordering};

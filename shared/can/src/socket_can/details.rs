@@ -1,4 +1,4 @@
-//! What the kernel knows of a CAN interface: settings, state and queue, asked over rtnetlink. This module judges nothing.
+//! The settings and the state of a CAN interface in the kernel: settings, state and queue, asked over rtnetlink. This module judges nothing.
 
 use std::fmt::{self, Display, Formatter};
 use std::{fs, io, path::Path};

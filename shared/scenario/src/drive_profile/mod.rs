@@ -1,6 +1,6 @@
 //! The master's expectations of a kind of drive: `[[drive_profile]]`.
 //!
-//! A profile is data: identity, units, objects, storing, brake and homing. This module talks to no drive. The emulated
+//! A profile is data: identity, units, objects, storing, brake and homing. This module sends nothing to a drive. The emulated
 //! drive's use of its profile is in the plant.
 
 mod dcf;

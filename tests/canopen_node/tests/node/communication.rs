@@ -1,4 +1,4 @@
-//! CiA 301: what a master may read, write and map, and when the node speaks.
+//! CiA 301: what a master may read, write and map, and when the node sends.
 
 use crate::client::{Client, EPOS4, N5, settings};
 use canopen_node::{Dcf, Node, Quirks, Settings};

@@ -1,4 +1,4 @@
-//! The node as a master sees it.
+//! The node from the side of a master.
 
 mod client;
 mod communication;

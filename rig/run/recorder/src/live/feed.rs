@@ -1,6 +1,6 @@
 //! The figures of a run that goes on, and how its page changes with them.
 //!
-//! A thread of its own takes the messages. It makes the page ten times a second while somebody watches, and keeps what has
+//! A thread of its own takes the messages. It makes the page ten times a second while a page is open, and keeps what has
 //! changed as an update. The recorder never waits for it: a message without room is left out of the page, and is counted.
 
 use std::sync::atomic::{AtomicU64, Ordering};
