@@ -400,7 +400,7 @@ fn a_program_that_declares_what_cannot_be_shown_is_refused_and_the_next_one_take
     assert!(answer_to(&name, "\u{1b}[2J").contains("no report of this version"));
     // This one never ends its line, and is out as soon as it has said too much.
     let endless = UnixStream::connect(socket(&Domain::named(&name).unwrap())).unwrap();
-    (&endless).write_all(line(&Hello::new()).as_bytes()).unwrap();
+    (&endless).write_all(line(&Hello::default()).as_bytes()).unwrap();
     while (&endless).write_all(&b"x".repeat(65_536)).is_ok() {}
     assert_eq!(program(&["--rig", &name]).status().unwrap().code(), Some(0));
     let output = rig.wait_with_output().unwrap();

@@ -149,7 +149,7 @@ fn the_json_is_the_baseline_of_a_later_run() {
     let said = now.trend_in_words().unwrap();
     assert!(said.contains("1 smaller, 0 larger, 1 equal; most of all a: force, 1 → 0.5"), "{said}");
     let mut renamed = passed(1.0).unwrap();
-    renamed.verdict.checks[0].name = "another".into();
+    renamed.checks[0].name = "another".into();
     let renamed = vec![tested("a", vec![Ok(renamed)])];
     let now_without = report(renamed, Some(Baseline::read(&path).unwrap()));
     let said_without = now_without.trend_in_words().unwrap();
