@@ -120,7 +120,7 @@ impl Analysis {
                 scenario.jaw.reference_point_m,
             ),
             limits: scenario.checks,
-            faults: FaultWatch::new(scenario.faults.len()),
+            faults: FaultWatch::new(scenario.faults.len(), scenario.checks),
             fault_kinds: scenario.faults.iter().map(|fault| fault.kind).collect(),
             responses: Responses::for_scenario(scenario),
             standstill: StandstillWatch::new(scenario),

@@ -50,11 +50,6 @@ impl Breach {
         Self { span_ns, ..self }
     }
 
-    /// When it was, or the end of its stretch, ns of the run's clock.
-    pub(crate) fn time_ns(&self) -> Option<u64> {
-        self.span_ns.map(|[_, at_ns]| at_ns)
-    }
-
     /// With its times since the motion began.
     fn since(self, motion_ns: Option<u64>) -> Self {
         let since_s = |ns: u64| Some((ns as f64 - motion_ns? as f64) / 1e9);

@@ -192,12 +192,11 @@ pub(crate) fn tracking(name: &'static str, errors: &PoseErrors, limits: &ChecksC
 
 /// A test with faults that passes without them has tested nothing, also where one struck only after the rig had
 /// stopped, unless it waits for the stop. A fault that leads the jaw beyond the limits must be detected before. None
-/// where no fault is declared. `suspects`: the numbers of those that acted as the jaw left its path. `lasted_s`: how long the run lasted since the motion began, and since the rig was switched on.
+/// where no fault is declared. `lasted_s`: how long the run lasted since the motion began, and since the rig was switched on.
 pub(crate) fn faults(
     scenario: &Scenario,
     found: &[FaultFigures],
-    suspects: &[usize],
-    stopped_ns: Option<u64>,
+    last_act_ns: Option<u64>,
     lasted_s: [Option<f64>; 2],
 ) -> Option<Check> {
     let Scenario { faults: declared, checks, .. } = scenario;
@@ -211,7 +210,7 @@ pub(crate) fn faults(
     let (mut acted, mut late, mut never) = (0, Vec::new(), Vec::new());
     let (mut behind, mut beyond) = (Vec::new(), Vec::new());
     for (fault, found) in declared.iter().zip(found) {
-        let FaultFigures { number, struck_ns, deviation_mm, deviation_deg, detection } = found;
+        let FaultFigures { number, struck_ns, deviation_mm, deviation_deg, led_off_path, detection } = found;
         let waits = waits_for_stop(scenario, fault.after.as_deref());
         match (struck_ns, behind_end(fault)) {
             (None, None) => never.push(number.to_string()),
@@ -220,14 +219,14 @@ pub(crate) fn faults(
                     ", number {number} at {when}: let the fault begin earlier, or play longer"
                 ));
             }
-            (Some(_), _) if !waits && stopped_ns.is_some_and(|ns| *struck_ns > Some(ns)) => {
+            (Some(_), _) if !waits && last_act_ns.is_some_and(|ns| *struck_ns > Some(ns)) => {
                 late.push(number.to_string());
             }
             (Some(_), _) => acted += 1,
         }
         let is_beyond =
             !is_within(*deviation_mm, tracking_max_mm) || !is_within(*deviation_deg, tracking_max_deg);
-        if is_beyond && suspects.contains(number) {
+        if is_beyond && *led_off_path {
             let until = if detection.is_some() { "before it was detected" } else { "undetected" };
             beyond.push(format!(
                 "; number {number}, {fault}, moved the jaw {deviation_mm:.3} mm and {deviation_deg:.3}° from its path {until}, \
@@ -257,12 +256,12 @@ pub(crate) fn faults(
 pub(crate) fn stimuli(
     scenario: &Scenario,
     began_ns: &[Option<u64>],
-    stopped_ns: Option<u64>,
+    last_act_ns: Option<u64>,
 ) -> Option<Check> {
     let declared = &scenario.stimulus;
     let (mut never, mut late, mut idle) = (Vec::new(), Vec::new(), Vec::new());
     for (place, (stimulus, began_ns)) in declared.iter().zip(began_ns).enumerate() {
-        let is_late = |began_ns| stopped_ns.is_some_and(|stopped_ns| began_ns > stopped_ns);
+        let is_late = |began_ns| last_act_ns.is_some_and(|last_ns| began_ns > last_ns);
         let list = match began_ns {
             None => &mut never,
             Some(_) if stimulus.changes_nothing() => &mut idle,

@@ -11,7 +11,6 @@ use masseter_scenario::{Dimension, ExpectedVerdict, wording::counted};
 
 use crate::check::{Check, CheckFigures, CheckResult, Subject, faults, stimuli, tracking};
 use crate::response::{BusResponse, ResponseFigures};
-use crate::stop_cause::suspects;
 use crate::timing::{Timing, TimingWord};
 use crate::{
     breach::Breach, events::EventRecord, figures::Figures, played::MotionFigures,
@@ -66,11 +65,10 @@ pub(crate) fn checks(manifest: &Manifest, figures: &Figures, timing: &Timing) ->
         bus_response(&figures.bus_response, &figures.plant_skips),
     ]);
     // No lost cycle excuses a declared fault that led the jaw too far.
-    let stopped_ns = figures.stopped_ns();
-    let suspects = suspects(figures);
-    let faults = faults(&manifest.scenario, &figures.faults, &suspects, stopped_ns, lasted_s(figures));
+    let last_act_ns = figures.last_act_ns();
+    let faults = faults(&manifest.scenario, &figures.faults, last_act_ns, lasted_s(figures));
     checks.extend(faults.map(|check| check.with_breach(path.first.clone())));
-    checks.extend(stimuli(&manifest.scenario, &began_ns(manifest, figures), stopped_ns));
+    checks.extend(stimuli(&manifest.scenario, &began_ns(manifest, figures), last_act_ns));
     checks
         .extend(figures.requirements.iter().map(|requirement| self::requirement(requirement, is_disturbed)));
     checks

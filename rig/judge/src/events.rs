@@ -12,7 +12,7 @@ use masseter_runtime::named::Declared;
 use masseter_scenario::{Dimension, Unit};
 use serde::{Serialize, Serializer};
 
-/// What ended longer before a report, or was reported longer before a stop, is another matter, ns.
+/// What ended earlier than this before a report, or was reported earlier than this before a stop, does not belong to it, ns.
 pub(crate) const AFTERMATH_NS: u64 = 500_000_000;
 
 /// The meaning of a code, or its number where the code has no meaning in this version.
@@ -176,13 +176,15 @@ impl From<&Event> for EventRecord {
     }
 }
 
-/// The first heard fault that belongs to the stop.
+/// The first heard fault that belongs to the stop. `quiet_stop_ns`: when a program stopped without an event.
 pub(crate) fn first_report(
     events: &[EventRecord],
+    quiet_stop_ns: Option<u64>,
     is_heard: impl Fn(&EventRecord) -> bool,
 ) -> Option<&EventRecord> {
     let stops = events.iter().filter(|event| event.begins_stop());
-    let since_ns = stops.map(|event| event.time_ns).min().map_or(0, |ns| ns.saturating_sub(AFTERMATH_NS));
+    let stopped_ns = stops.map(|event| event.time_ns).min().or(quiet_stop_ns);
+    let since_ns = stopped_ns.map_or(0, |ns| ns.saturating_sub(AFTERMATH_NS));
     let belongs = |event: &&EventRecord| {
         event.kind == EventKind::Fault && event.time_ns >= since_ns && !event.is_without_error()
     };

@@ -138,7 +138,7 @@ impl Figures {
 
     /// The first fault that anybody reports of what stopped the rig.
     pub fn first_fault(&self) -> Option<&EventRecord> {
-        first_report(&self.events, |_| true)
+        first_report(&self.events, self.stop_without_event_ns, |_| true)
     }
 
     /// When the rig began to stop: a safe stop, or one by request. A program stops without an event.
@@ -146,5 +146,16 @@ impl Figures {
         let is_stop = |event: &&EventRecord| event.begins_stop() || event.cause == Cause::StopRequested;
         let stops = self.events.iter().filter(is_stop);
         stops.map(|event| event.time_ns).min().or(self.stop_without_event_ns)
+    }
+
+    /// Until when a fault or stimulus acts on the motion: a safe stop begins, or the drives are switched off after a stop by
+    /// request, which lets the motion come to rest before.
+    pub(crate) fn last_act_ns(&self) -> Option<u64> {
+        let is_requested = self.was_stopped_by_request();
+        let is_end = |event: &&EventRecord| {
+            event.begins_stop() || (is_requested && event.enters(ControllerState::Disabling))
+        };
+        let ends = self.events.iter().filter(is_end);
+        ends.map(|event| event.time_ns).min().or(self.stop_without_event_ns)
     }
 }

@@ -85,20 +85,15 @@ pub(crate) fn overload(usage: &RunUsage, rate_hz: u32) -> Option<String> {
 pub(crate) type OutcomeReason = (Outcome, String);
 
 /// What master and drives show comes before what the controller reports.
-pub(crate) fn ending(
-    ending: &Ending,
-    stopped_by: Option<StoppedBy>,
-    declared: Option<String>,
-    events: &[EventRecord],
-) -> Option<OutcomeReason> {
+pub(crate) fn ending(ending: &Ending, declared: Option<String>, figures: &Figures) -> Option<OutcomeReason> {
     match ending {
         Ending::Completed | Ending::Overdue => {
             // The plant itself stops the drives of a controller that is overdue.
             let is_cause = |by: &StoppedBy| *ending == Ending::Completed || *by == StoppedBy::Master;
-            let by = stopped_by.filter(is_cause);
-            by.map(|by| (Outcome::Named(SafeStop), stopped(Some(by), declared, events)))
+            let by = figures.stopped_by.filter(is_cause);
+            by.map(|by| (Outcome::Named(SafeStop), stopped(Some(by), declared, figures)))
         }
-        Ending::SafeStop => Some((Outcome::Named(SafeStop), stopped(None, declared, events))),
+        Ending::SafeStop => Some((Outcome::Named(SafeStop), stopped(None, declared, figures))),
         Ending::Died { process, how } => Some((Outcome::Named(Died), format!("the {process} died: {how}"))),
         Ending::Interrupted => Some((Outcome::Named(Interrupted), "stopped by the user".to_owned())),
         Ending::NotStarted => Some((Outcome::Invalid, "real time was required and refused".to_owned())),
@@ -121,8 +116,11 @@ pub(crate) fn stopped_by_stimulus(scenario: &Scenario, events: &[EventRecord]) -
 /// another end explains nothing. `by`: what master or drives show of it, whatever the controller reports.
 ///
 /// A declared fault or stimulus stands before what followed from it.
-fn stopped(by: Option<StoppedBy>, declared: Option<String>, events: &[EventRecord]) -> String {
-    let first = first_report(events, |event| by.is_none() || event.source != Source::Controller);
+fn stopped(by: Option<StoppedBy>, declared: Option<String>, figures: &Figures) -> String {
+    let Figures { events, stop_without_event_ns, .. } = figures;
+    let first = first_report(events, *stop_without_event_ns, |event| {
+        by.is_none() || event.source != Source::Controller
+    });
     let since_s = |fault: &EventRecord| since_motion_s(events, fault.time_ns);
     let who = by.map_or_else(|| "the controller stopped the rig".to_owned(), |by| by.to_string());
     match (declared, first) {

@@ -110,7 +110,7 @@ impl Shortfall {
     fn of_stated_stop(manifest: &Manifest, figures: &Figures) -> Option<Self> {
         let expect = manifest.scenario.expect.as_ref();
         let is_expected = expect.is_some_and(|expect| expect.accepts(ExpectedVerdict::SafeStop));
-        let has_cause = acted_before(manifest, figures, figures.stopped_ns().unwrap_or(u64::MAX));
+        let has_cause = acted_before(manifest, figures, figures.last_act_ns().unwrap_or(u64::MAX));
         let is_proved = has_cause || has_judged_truth(figures) || !manifest.is_of_program();
         (is_expected && !is_proved).then_some(Self::OnlyStated)
     }

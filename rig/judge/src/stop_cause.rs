@@ -10,12 +10,11 @@ use masseter_runtime::injection::Injected;
 use masseter_runtime::messages::codes::Cause;
 use masseter_scenario::Scenario;
 
-use crate::breach::Breach;
 use crate::declared_faults::FaultFigures;
 use crate::events::{AFTERMATH_NS, EventRecord};
 use crate::figures::Figures;
 
-/// What began so short before a report comes before what has acted for longer, ns.
+/// What began so shortly before a report comes before what has acted for longer, ns.
 const FRESH_NS: u64 = 100_000_000;
 
 /// A fault or stimulus of the scenario that explains a stop.
@@ -38,30 +37,33 @@ enum Place {
 /// The likeliest entry of the scenario that acted before the first report; none without one.
 pub(crate) fn declared_cause(manifest: &Manifest, figures: &Figures) -> Option<DeclaredCause> {
     let report = figures.first_fault();
-    let reported_ns = report.map_or(u64::MAX, |event| event.time_ns);
-    let is_fresh = |cause: &DeclaredCause| cause.struck_ns.saturating_add(FRESH_NS) >= reported_ns;
+    let stopped_ns = stopped_ns(figures);
+    let likelihood = |cause: &DeclaredCause| {
+        let place = place(&manifest.scenario, cause.injected, report);
+        let is_fresh = cause.struck_ns.saturating_add(FRESH_NS) >= stopped_ns;
+        (is_fresh && place != Place::Elsewhere, place, cause.struck_ns)
+    };
+    // A stop that the scenario asks for explains no other one.
+    let is_stop = |cause: &DeclaredCause| match cause.injected {
+        Injected::Stimulus(place) => manifest.scenario.stimulus.get(place).is_some_and(|found| found.stop),
+        Injected::Fault(_) => false,
+    };
     faults(figures)
         .chain(stimuli(manifest, figures))
-        .filter(|cause| cause.acted_before(reported_ns, figures))
-        .max_by_key(|cause| {
-            (is_fresh(cause), place(&manifest.scenario, cause.injected, report), cause.struck_ns)
-        })
+        .filter(|cause| !is_stop(cause) && cause.acted_before(stopped_ns, figures))
+        .max_by_key(likelihood)
 }
 
 /// Whether a fault of the scenario acted before the first report.
 pub(crate) fn has_declared_fault(figures: &Figures) -> bool {
-    let reported_ns = figures.first_fault().map_or(u64::MAX, |event| event.time_ns);
-    faults(figures).any(|cause| cause.acted_before(reported_ns, figures))
+    let stopped_ns = stopped_ns(figures);
+    faults(figures).any(|cause| cause.acted_before(stopped_ns, figures))
 }
 
-/// The numbers of the faults that acted as the jaw left its path, or had ended shortly before; without such a time all faults.
-pub(crate) fn suspects(figures: &Figures) -> Vec<usize> {
-    let left_ns = figures.path_breach.first.as_ref().and_then(Breach::time_ns);
-    let may_be = |fault: &&FaultFigures| {
-        let acted = |left_ns| of_fault(fault).is_some_and(|cause| cause.acted_before(left_ns, figures));
-        left_ns.is_none_or(acted)
-    };
-    figures.faults.iter().filter(may_be).map(|fault| fault.number).collect()
+/// When the stop was reported, or else began.
+fn stopped_ns(figures: &Figures) -> u64 {
+    let reported_ns = figures.first_fault().map(|event| event.time_ns);
+    reported_ns.or(figures.last_act_ns()).unwrap_or(u64::MAX)
 }
 
 /// Whether a fault or stimulus of the scenario acted at that time, or had ended shortly before.
@@ -78,15 +80,13 @@ fn of_fault(fault: &FaultFigures) -> Option<DeclaredCause> {
     Some(DeclaredCause { injected, struck_ns: fault.struck_ns? })
 }
 
-/// A stop that the scenario asks for is no cause of another one, and no stimulus makes a program fail.
+/// No stimulus makes a program fail.
 fn stimuli(manifest: &Manifest, figures: &Figures) -> impl Iterator<Item = DeclaredCause> {
     let began = figures.events.iter().filter(|event| event.cause == Cause::StimulusBegan);
     let is_cause = !is_of_program_alone(manifest, figures.first_fault());
     began.filter(move |_| is_cause).filter_map(|event| {
         let place = (event.value as usize).checked_sub(1)?;
-        let stimulus = manifest.scenario.stimulus.get(place)?;
-        let cause = DeclaredCause { injected: Injected::Stimulus(place), struck_ns: event.time_ns };
-        (!stimulus.stop).then_some(cause)
+        Some(DeclaredCause { injected: Injected::Stimulus(place), struck_ns: event.time_ns })
     })
 }
 

@@ -3,7 +3,7 @@
 //! [`Timing`] is judged apart. Lost cycles matter here only where they leave nothing to judge the function by.
 
 use masseter_recording::Manifest;
-use masseter_scenario::ExpectedVerdict::{Died, Fail, Interrupted, Pass, SafeStop, Untested};
+use masseter_scenario::ExpectedVerdict::{Died, Fail, Incomplete, Interrupted, Pass, SafeStop, Untested};
 use masseter_scenario::{ChecksConfig, ExpectConfig, ExpectedVerdict, TimingConfig};
 use masseter_terminal::Exit;
 use serde::Serialize;
@@ -70,30 +70,26 @@ impl Verdict {
         let excuse = excuse(manifest, figures, &timing);
         let is_too_late = figures.path_breach.first.is_some();
         let declared = declared_in_words(manifest, figures);
-        let (mut outcome, mut reason) =
-            ending(&manifest.ending, figures.stopped_by, declared, &figures.events)
-                .map(|(ending, reason)| match ending {
-                    Outcome::Named(Died) => (ending, format!("{reason}, {}", when_died(figures))),
-                    _ => (ending, reason),
-                })
-                .or_else(|| stopped_by_stimulus(&manifest.scenario, &figures.events))
-                // The machine caused the stop, or it came only after the jaw had left its path.
-                .filter(|(ending, _)| {
-                    *ending != Outcome::Named(SafeStop) || (excuse.is_none() && !is_too_late)
-                })
-                .or_else(|| incomplete(figures))
-                .or_else(|| {
-                    let unjudged =
-                        excuse.or_else(|| unjudged(&manifest.scenario.checks, &timing, &checks))?;
-                    Some((Outcome::Invalid, format!("{unjudged}; {}", account(manifest, figures, &timing))))
-                })
-                .or_else(|| {
-                    failed(&checks)
-                        .map(|failure| with_shortfall(failure, manifest, figures))
-                        .map(|failure| clock_jump(&manifest.usage, &manifest.scenario.can).unwrap_or(failure))
-                })
-                .or_else(|| untested(&checks, figures.cycles))
-                .unwrap_or_else(|| (Outcome::Named(Pass), passed(manifest, figures)));
+        let (mut outcome, mut reason) = ending(&manifest.ending, declared, figures)
+            .map(|(ending, reason)| match ending {
+                Outcome::Named(Died) => (ending, format!("{reason}, {}", when_died(figures))),
+                _ => (ending, reason),
+            })
+            .or_else(|| stopped_by_stimulus(&manifest.scenario, &figures.events))
+            // The machine caused the stop, or it came only after the jaw had left its path.
+            .filter(|(ending, _)| *ending != Outcome::Named(SafeStop) || (excuse.is_none() && !is_too_late))
+            .or_else(|| incomplete(figures))
+            .or_else(|| {
+                let unjudged = excuse.or_else(|| unjudged(&manifest.scenario.checks, &timing, &checks))?;
+                Some((Outcome::Invalid, format!("{unjudged}; {}", account(manifest, figures, &timing))))
+            })
+            .or_else(|| {
+                failed(&checks)
+                    .map(|failure| with_shortfall(failure, manifest, figures))
+                    .map(|failure| clock_jump(&manifest.usage, &manifest.scenario.can).unwrap_or(failure))
+            })
+            .or_else(|| untested(&checks, figures.cycles))
+            .unwrap_or_else(|| (Outcome::Named(Pass), passed(manifest, figures)));
         if let Some(expect) = expect {
             (outcome, reason) = against(expect, (outcome, reason), [&checks, &beside], figures);
         }
@@ -211,10 +207,12 @@ fn against(
         return other;
     }
     // A fault or stimulus that did not act shows nothing, whatever is expected. The rig's own checks still count, also those of
-    // the motion until a process died or the recording ended. What they leave unrecorded follows from the expected end.
+    // the motion until a process died or the recording ended. What they leave unrecorded follows from the expected end; a gap in
+    // an expected loss leaves nothing to compare the jaw with.
     let own = || {
         let is_in_order = matches!(ending, SafeStop | Interrupted);
-        let follows = |check: &&Check| !is_in_order && check.subject == Subject::Recording;
+        let has_gap = ending == Incomplete && (figures.missing_messages() > 0 || !figures.damage.is_empty());
+        let follows = |check: &&Check| !is_in_order && (has_gap || check.subject == Subject::Recording);
         let function: Vec<_> = checks.iter().filter(|check| !follows(check)).cloned().collect();
         let short = is_in_order.then(|| incomplete(figures)).flatten();
         let counts =

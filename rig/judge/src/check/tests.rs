@@ -108,7 +108,14 @@ mod motion_checks {
     }
 
     fn figures(number: usize, struck_ns: Option<u64>, deviation_mm: f64) -> FaultFigures {
-        FaultFigures { number, struck_ns, deviation_mm, deviation_deg: 0.1, detection: None }
+        FaultFigures {
+            number,
+            struck_ns,
+            deviation_mm,
+            deviation_deg: 0.1,
+            led_off_path: true,
+            detection: None,
+        }
     }
 
     #[test]
@@ -123,11 +130,11 @@ mod motion_checks {
         for (declared, expected) in cases {
             let found: Vec<_> =
                 (1..=declared).map(|number| figures(number, (number == 1).then_some(5), 0.0)).collect();
-            let check = faults(&with(vec![fault(); declared]), &found, &[1, 2, 3], None, [None; 2]);
+            let check = faults(&with(vec![fault(); declared]), &found, None, [None; 2]);
             assert_eq!(check.map(|check| (check.result.mark(), check.finding)), expected);
         }
         let found = [figures(1, None, 0.0), figures(2, Some(5), 0.6)];
-        let check = faults(&with(vec![fault(), fault()]), &found, &[1, 2], None, [None; 2]).unwrap();
+        let check = faults(&with(vec![fault(), fault()]), &found, None, [None; 2]).unwrap();
         assert_eq!(check.result.mark(), "FAIL", "one fault led the jaw too far: {check:?}");
     }
 
@@ -136,7 +143,7 @@ mod motion_checks {
         let finding = |fault: FaultConfig| {
             let lasted_s = [Some(9.8104), Some(11.3)];
             let found = [figures(1, None, 0.0)];
-            faults(&with(vec![fault]), &found, &[1], None, lasted_s).unwrap().finding
+            faults(&with(vec![fault]), &found, None, lasted_s).unwrap().finding
         };
         let never = "0 of 1 declared faults acted, number 1 never: ";
         let late = "0 of 1 declared faults acted, number 1 at 12 s, after the run's end at ";
@@ -156,7 +163,7 @@ mod motion_checks {
         let stopped = |struck_ns, after: Option<&str>| {
             let fault = FaultConfig { after: after.map(str::to_owned), ..fault() };
             let chain = Scenario { stimulus: chain(), ..with(vec![fault]) };
-            let check = faults(&chain, &[figures(1, Some(struck_ns), 0.0)], &[1], Some(5), [None; 2]);
+            let check = faults(&chain, &[figures(1, Some(struck_ns), 0.0)], Some(5), [None; 2]);
             check.map(|check| (check.result.mark(), check.finding)).unwrap()
         };
         assert_eq!(stopped(5, None).0, "ok", "it began the stop");
@@ -221,23 +228,24 @@ mod motion_checks {
     fn a_fault_that_leads_the_jaw_beyond_the_limit_fails_the_run_with_its_name() {
         for (deviation_mm, mark) in [(0.5, "ok"), (0.51, "FAIL")] {
             let found = [figures(1, Some(5), deviation_mm)];
-            let check = faults(&with(vec![fault()]), &found, &[1], None, [None; 2]).unwrap();
+            let check = faults(&with(vec![fault()]), &found, None, [None; 2]).unwrap();
             assert_eq!(check.result.mark(), mark, "{check:?}");
             let named = "number 1, lose (bus 1, node 4, id 204h), moved the jaw 0.510 mm and 0.100° from its path \
                          undetected, limit 0.5 mm and 0.5°";
             assert_eq!(check.finding.contains(named), mark == "FAIL", "{check:?}");
         }
-        let found = [figures(1, Some(5), 9.0), figures(2, Some(7), 9.0)];
-        let both = faults(&with(vec![fault(), fault()]), &found, &[1], None, [None; 2]).unwrap();
+        let other = FaultFigures { led_off_path: false, ..figures(2, Some(7), 9.0) };
+        let found = [figures(1, Some(5), 9.0), other];
+        let both = faults(&with(vec![fault(), fault()]), &found, None, [None; 2]).unwrap();
         assert!(both.finding.contains("number 1, ") && !both.finding.contains("number 2, "), "{both:?}");
         let turned = FaultFigures { deviation_deg: 0.5, ..figures(1, Some(5), 0.1) };
-        let check = faults(&with(vec![fault()]), &[turned], &[1], None, [None; 2]).unwrap();
+        let check = faults(&with(vec![fault()]), &[turned], None, [None; 2]).unwrap();
         assert_eq!(check.result.mark(), "ok", "{check:?}");
         for deviation_deg in [0.51, f64::INFINITY, f64::NAN] {
             let turned = FaultFigures { deviation_deg, ..figures(1, Some(5), 0.1) };
             let shifted = FaultFigures { deviation_mm: deviation_deg, ..figures(1, Some(5), 0.1) };
             for found in [turned, shifted] {
-                let check = faults(&with(vec![fault()]), &[found], &[1], None, [None; 2]).unwrap();
+                let check = faults(&with(vec![fault()]), &[found], None, [None; 2]).unwrap();
                 assert_eq!(check.result.mark(), "FAIL", "{check:?}");
             }
         }

@@ -6,6 +6,10 @@ use crate::{SignalFigures, events::Code};
 use masseter_recording::{MachineInfo, Usage};
 use masseter_runtime::named::Signal;
 
+fn run(stopped_by: Option<StoppedBy>, events: &[EventRecord]) -> Figures {
+    Figures { stopped_by, events: events.to_vec(), ..Figures::default() }
+}
+
 #[test]
 fn a_safe_stop_is_explained_by_what_went_wrong_first() {
     let event = |source, kind, cause| Event::new(source, kind, cause);
@@ -16,21 +20,24 @@ fn a_safe_stop_is_explained_by_what_went_wrong_first() {
         event(Source::Controller, EventKind::Fault, Cause::MasterFault),
     ];
     let (outcome, reason) =
-        ending(&Ending::SafeStop, None, None, &events.map(|event| EventRecord::from(&event))).unwrap();
+        ending(&Ending::SafeStop, None, &run(None, &events.map(|event| EventRecord::from(&event)))).unwrap();
     assert_eq!(outcome, Outcome::Named(SafeStop));
     assert_eq!(
         reason,
         "the controller stopped the rig; first fault: master: process_data_lost \
          (axis d1 (node 1 on bus 0): process data missing for 4 cycles)"
     );
-    assert_eq!(ending(&Ending::SafeStop, None, None, &[]).unwrap().1, "the controller stopped the rig");
+    assert_eq!(
+        ending(&Ending::SafeStop, None, &Figures::default()).unwrap().1,
+        "the controller stopped the rig"
+    );
 }
 
 #[test]
 fn what_master_and_drives_show_comes_before_what_the_controller_reports() {
     let fault = |source, cause| EventRecord::from(&Event::new(source, EventKind::Fault, cause));
     let events = [fault(Source::Controller, Cause::LawFailed), fault(Source::Master, Cause::BadMessage)];
-    let shown = |stopped_by| ending(&Ending::Completed, stopped_by, None, &events);
+    let shown = |stopped_by| ending(&Ending::Completed, None, &run(stopped_by, &events));
     assert_eq!(shown(None), None);
     let stopped = |reason: &str| Some((Outcome::Named(SafeStop), reason.to_owned()));
     assert_eq!(
@@ -38,18 +45,18 @@ fn what_master_and_drives_show_comes_before_what_the_controller_reports() {
         stopped("the master stopped the drives; first fault: master: bad_message (value 0, limit 0)")
     );
     assert_eq!(
-        ending(&Ending::Completed, Some(StoppedBy::QuickStop), None, &events[..1]),
+        ending(&Ending::Completed, None, &run(Some(StoppedBy::QuickStop), &events[..1])),
         stopped("the drives made a quick stop")
     );
     // The plant's own stop at the deadline is no fault.
-    assert_eq!(ending(&Ending::Overdue, Some(StoppedBy::QuickStop), None, &events), None);
+    assert_eq!(ending(&Ending::Overdue, None, &run(Some(StoppedBy::QuickStop), &events)), None);
     assert_eq!(
-        ending(&Ending::Overdue, Some(StoppedBy::Master), None, &events),
+        ending(&Ending::Overdue, None, &run(Some(StoppedBy::Master), &events)),
         shown(Some(StoppedBy::Master))
     );
     // The end of a process comes before both.
     let died = Ending::died("plant", "signal 9".to_owned());
-    assert_eq!(ending(&died, Some(StoppedBy::Master), None, &events).unwrap().0, Outcome::Named(Died));
+    assert_eq!(ending(&died, None, &run(Some(StoppedBy::Master), &events)).unwrap().0, Outcome::Named(Died));
 }
 
 #[test]
@@ -66,12 +73,12 @@ fn a_fault_of_the_scenario_stands_before_what_followed_from_it() {
     let found = event(2_302_000_000, Source::Master, EventKind::Fault, Cause::BadMessage);
     let events = [began, found];
     assert_eq!(
-        stopped(None, declared(), &events),
+        stopped(None, declared(), &run(None, &events)),
         "fault encoder_stuck (l1) at 1.800 s → detected at 1.802 s: master: bad_message (value 0, limit 0) \
          → the controller stopped the rig"
     );
     assert_eq!(
-        stopped(Some(StoppedBy::QuickStop), declared(), &[]),
+        stopped(Some(StoppedBy::QuickStop), declared(), &Figures::default()),
         "fault encoder_stuck (l1) at 1.800 s → the drives made a quick stop"
     );
 }

@@ -271,6 +271,5 @@ fn an_expected_safe_stop_needs_more_than_the_controllers_word() {
 }
 
 fn strike(figures: &mut Figures, struck_ns: Option<u64>) {
-    let [deviation_mm, deviation_deg] = [0.0; 2];
-    figures.faults.push(FaultFigures { number: 1, struck_ns, deviation_mm, deviation_deg, detection: None });
+    figures.faults.push(FaultFigures { number: 1, struck_ns, ..FaultFigures::default() });
 }

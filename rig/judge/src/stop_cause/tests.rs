@@ -79,7 +79,7 @@ fn the_likeliest_entry_of_several_explains_the_stop() {
     let friction: FaultKindConfig = AxisFault::Friction.into();
     let fault = |place| Some(Injected::Fault(place));
     let stimulus = |place| Some(Injected::Stimulus(place));
-    let rows: [(&str, Vec<Entry>, Option<Injected>); 11] = [
+    let rows: [(&str, Vec<Entry>, Option<Injected>); 12] = [
         ("nothing", vec![], None),
         ("the last of those that have acted for long", vec![Platform(300), Platform(900)], fault(1)),
         (
@@ -96,6 +96,11 @@ fn the_likeliest_entry_of_several_explains_the_stop() {
             "a fresh fault anywhere, behind an old one of the axis",
             vec![Axis(friction, "l2", 500), Platform(1480)],
             fault(1),
+        ),
+        (
+            "an old fault of the axis, beside a fresh one elsewhere",
+            vec![Axis(friction, "l2", 500), Axis(storm, "d1", 1480)],
+            fault(0),
         ),
         ("an old fault of the axis", vec![Axis(friction, "l2", 500), Axis(friction, "d1", 900)], fault(0)),
         ("a fault of the bus of the axis", vec![Bus(1, 1490), Axis(jam, "d1", 1493)], fault(0)),
@@ -133,13 +138,26 @@ fn an_entry_that_ended_long_before_explains_nothing() {
     }
 }
 
+/// A program that switches the drives off reports nothing.
 #[test]
-fn a_fault_that_began_once_the_jaw_was_off_its_path_or_ended_long_before_led_it_nowhere() {
-    let faults = [Platform(100), Platform(900), Platform(1100)];
-    let (_, mut figures) = run(&faults, &[], &[(1, 200)]);
-    assert_eq!(suspects(&figures), [1, 2, 3], "nobody knows when");
-    figures.path_breach.first = Some(Breach::new("incisal point", "0.6 mm", "0.5 mm").at(1000 * MS));
-    assert_eq!(suspects(&figures), [2]);
+fn a_stop_without_a_report_is_explained_by_what_acted_before_it() {
+    for (struck_ms, ended_ms, is_cause) in [(100, 1499, true), (100, 900, false), (1501, 1600, false)] {
+        let (manifest, mut figures) = run(&[Platform(struck_ms)], &[], &[(1, ended_ms)]);
+        figures.events.retain(|event| event.kind != EventKind::Fault);
+        figures.stop_without_event_ns = Some(STOPPED_NS);
+        assert_eq!(
+            declared_cause(&manifest, &figures).is_some(),
+            is_cause,
+            "from {struck_ms} to {ended_ms} ms"
+        );
+    }
+}
+
+#[test]
+fn an_operators_stop_is_a_cause_of_the_programs_answer_and_explains_no_other_stop() {
+    let (manifest, figures) = run(&[Stop(1490)], &[], &[]);
+    assert_eq!(declared_cause(&manifest, &figures), None);
+    assert!(acted_before(&manifest, &figures, STOPPED_NS));
 }
 
 #[test]

@@ -100,6 +100,7 @@ impl Run {
             struck_ns: None,
             deviation_mm: 0.0,
             deviation_deg: 0.0,
+            led_off_path: false,
             detection: None,
         };
         self.figures.faults.push(idle);

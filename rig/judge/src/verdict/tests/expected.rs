@@ -92,6 +92,12 @@ fn an_expected_death_or_lost_recording_excuses_what_is_not_recorded_and_no_other
             assert_eq!(judge(&run).0, word, "case {number}: {}", judge(&run).1);
         }
     }
+    // The desired pose stands still in a gap of an expected loss.
+    for (mut run, word) in [(died(), "FAIL"), (unwritten(), "PASS")] {
+        run.lose(5);
+        run.figures.tracking.actual.max_mm = Some(19.0);
+        assert_eq!(judge(&run).0, word, "{}", judge(&run).1);
+    }
 }
 
 #[test]
@@ -221,7 +227,7 @@ fn a_fault_that_never_acted_is_untested_whatever_is_expected() {
         run.declare_fault();
         let other = &mut run.figures.faults[1];
         (other.number, other.struck_ns) = (2, Some(1));
-        other.deviation_mm = 9.0;
+        (other.deviation_mm, other.led_off_path) = (9.0, true);
     };
     assert_eq!(idle(Untested, &[], |_| ()).0, "UNTESTED");
     assert_eq!(idle(Untested, &[], |run| require(run, CheckResult::Untested, true)).0, "UNTESTED");
