@@ -73,9 +73,10 @@ impl PlantCore {
         Self::with_link(VirtualLink::new(scenario, 0, now_ns)?, scenario, now_ns)
     }
 
-    /// Whether both plants have the same tables of pushes.
-    pub fn has_pushes_of(&self, other: &Self) -> bool {
-        self.link.emulation.agenda.has_pushes_of(&other.link.emulation.agenda)
+    /// Takes the rows of the pushes' tables, which no serialised plant has, from another plant of the scenario. False if the
+    /// pushes are others.
+    pub fn take_tables_of(&mut self, other: &Self) -> bool {
+        self.link.emulation.agenda.take_tables_of(&other.link.emulation.agenda)
     }
 }
 

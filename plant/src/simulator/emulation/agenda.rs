@@ -89,15 +89,16 @@ impl Agenda {
         self.entries.is_empty()
     }
 
-    /// Whether both have the same tables of pushes.
-    pub(crate) fn has_pushes_of(&self, other: &Self) -> bool {
-        fn pushes(agenda: &Agenda) -> impl Iterator<Item = &Push> {
-            agenda.entries.iter().filter_map(|entry| match &entry.effect {
-                Effect::Push(push) => Some(&**push),
-                _ => None,
+    /// Takes the rows of the pushes' tables from another agenda of the scenario; false if the pushes are others.
+    pub(crate) fn take_tables_of(&mut self, other: &Self) -> bool {
+        self.entries.len() == other.entries.len()
+            && self.entries.iter_mut().zip(&other.entries).all(|(entry, other)| {
+                match (&mut entry.effect, &other.effect) {
+                    (Effect::Push(push), Effect::Push(other)) => push.take_rows_of(other),
+                    (Effect::Push(_), _) | (_, Effect::Push(_)) => false,
+                    _ => true,
+                }
             })
-        }
-        pushes(self).eq(pushes(other))
     }
 
     /// Sets the window of an entry.

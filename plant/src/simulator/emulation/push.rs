@@ -2,7 +2,7 @@
 //!
 //! Comments in the file begin with `#`, and blank lines are ignored. Between two rows the values change evenly.
 
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 use masseter_runtime::clock::SECOND_NS;
 use masseter_scenario::rows::{fields, lines, numbers};
@@ -21,8 +21,18 @@ pub(crate) struct Push {
 
 #[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
 enum Course {
-    Shaped { whole: Vector6<f64>, shape: Shape, for_s: f64, frequency_hz: f64 },
-    Table(WrenchTable),
+    Shaped {
+        whole: Vector6<f64>,
+        shape: Shape,
+        for_s: f64,
+        frequency_hz: f64,
+    },
+    /// A file of a snapshot has the checksum of the rows, which are those of its scenario.
+    Table {
+        checksum: u32,
+        #[serde(skip)]
+        rows: Arc<WrenchTable>,
+    },
 }
 
 impl Push {
@@ -31,7 +41,10 @@ impl Push {
         let StimulusConfig { push_n, torque_n_m, push_table, point_m, shape, for_s, frequency_hz, .. } =
             config;
         let course = match (push_table, push_n, torque_n_m) {
-            (Some(path), ..) => Course::Table(WrenchTable::read(path)?),
+            (Some(path), ..) => {
+                let rows = WrenchTable::read(path)?;
+                Course::Table { checksum: rows.checksum(), rows: Arc::new(rows) }
+            }
             (None, None, None) => return Ok(None),
             (None, force_n, torque_n_m) => {
                 let [[x, y, z], [a, b, c]] = [force_n, torque_n_m].map(|given| given.unwrap_or_default());
@@ -46,11 +59,22 @@ impl Push {
         Ok(Some(Self { course, point_m: *point_m }))
     }
 
+    /// Takes the rows of the same push; false if this is another one.
+    pub(crate) fn take_rows_of(&mut self, other: &Self) -> bool {
+        if let (Course::Table { checksum, rows }, Course::Table { checksum: wanted, rows: found }) =
+            (&mut self.course, &other.course)
+            && checksum == wanted
+        {
+            rows.clone_from(found);
+        }
+        self == other
+    }
+
     /// Its most time, ns: a table ends with its last row.
     pub(crate) fn longest_ns(&self) -> u64 {
         match &self.course {
             Course::Shaped { .. } => u64::MAX,
-            Course::Table(table) => (table.length_s() * SECOND_NS as f64) as u64,
+            Course::Table { rows, .. } => (rows.length_s() * SECOND_NS as f64) as u64,
         }
     }
 
@@ -61,7 +85,7 @@ impl Push {
             Course::Shaped { whole, shape, for_s, frequency_hz } => {
                 whole * shape.at(since_s, *for_s, *frequency_hz)
             }
-            Course::Table(table) => table.at(since_s),
+            Course::Table { rows, .. } => rows.at(since_s),
         }
     }
 }
@@ -74,7 +98,7 @@ const OF_FORCES: usize = 4;
 const LARGEST: [f64; 7] = [86_400.0, 2000.0, 2000.0, 2000.0, 200.0, 200.0, 200.0];
 
 /// The rows of a table.
-#[derive(Debug, Clone, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct WrenchTable {
     /// Strictly increasing from 0.
     time_s: Vec<f64>,
@@ -127,6 +151,13 @@ impl WrenchTable {
         self.time_s.push(time_s);
         self.wrench.push(Vector6::from_fn(|place, _| row.get(place + 1).copied().unwrap_or_default()));
         Ok(())
+    }
+
+    fn checksum(&self) -> u32 {
+        let mut hasher = crc32fast::Hasher::new();
+        let values = self.time_s.iter().chain(self.wrench.iter().flatten());
+        values.for_each(|value| hasher.update(&value.to_le_bytes()));
+        hasher.finalize()
     }
 
     /// The time of the last row, s.

@@ -196,12 +196,12 @@ impl Snapshot {
         if found != own {
             return Err(OtherScenario::new(&self.scenario, &found.name, found.seed).into());
         }
-        let ((stepper, latest, has_failed), rest) =
+        let ((mut stepper, latest, has_failed), rest) =
             postcard::take_from_bytes::<(StepperState, Latest, bool)>(state).map_err(damaged)?;
         if !rest.is_empty() {
             return Err(SnapshotProblem::Damaged);
         }
-        if !stepper.has_pushes_of(&self.stepper) {
+        if !stepper.take_tables_of(&self.stepper) {
             return Err(SnapshotProblem::OtherTable);
         }
         Ok(Self { stepper, latest, has_failed, ..self })

@@ -31,9 +31,9 @@ pub(crate) struct StepperState {
 }
 
 impl StepperState {
-    /// Whether both are of the same tables of pushes.
-    pub(crate) fn has_pushes_of(&self, other: &Self) -> bool {
-        self.plant.has_pushes_of(&other.plant)
+    /// Takes the rows of the pushes' tables from another state of the scenario; false if the pushes are others.
+    pub(crate) fn take_tables_of(&mut self, other: &Self) -> bool {
+        self.plant.take_tables_of(&other.plant)
     }
 }
 
