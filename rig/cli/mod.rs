@@ -249,9 +249,8 @@ fn execute(verb: Verb) -> Result<Exit, Failure> {
 
 /// Plays, judges and reports a run.
 fn run(request: &RunRequest) -> Result<Exit, Failure> {
-    // Before the folder: an interrupt then leaves no folder without a manifest.
-    let interrupts = crate::run::interrupts::Interrupts::of_verb()?;
     let prepared = crate::run::PreparedRun::new(request)?;
+    let interrupts = crate::run::interrupts::Interrupts::of_verb()?;
     let played = prepared.play(&interrupts);
     interrupts.restore_default_actions();
     played?.report()

@@ -183,7 +183,9 @@ impl Ledger for OwedFiles {
             return Ok(());
         }
         let owed = Owed { drive: self.drives[axis], values: values.to_vec() };
-        write_whole(&path, &serde_json::to_string_pretty(&owed)?)
+        write_whole(&path, &serde_json::to_string_pretty(&owed)?)?;
+        // No drive is changed before its old values outlast a power cut.
+        File::open(&self.folder)?.sync_all()
     }
 }
 

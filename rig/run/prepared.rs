@@ -19,11 +19,6 @@ pub(crate) struct PreparedRun {
     request: RunRequest,
     /// None under virtual time.
     domain: Option<(masseter_runtime::transport::Domain, masseter_runtime::transport::DomainLock)>,
-    folder: RunFolder,
-    manifest: Manifest,
-    reserve: Reserve,
-    /// Until the run is reported.
-    occupied: Option<std::fs::File>,
 }
 
 /// A run that has ended.
@@ -42,9 +37,9 @@ pub(crate) struct PlayedRun {
 }
 
 impl PreparedRun {
-    /// Refuses a run that cannot start, and makes the folder of one that can.
+    /// Refuses a run that cannot start. A signal ends this as it ends any program: nothing is made yet.
     pub(crate) fn new(request: &RunRequest) -> Result<Self, Failure> {
-        room::check_limits().usage()?;
+        room::check_memory_limits().usage()?;
         let (plan, request) = resolve(request).usage()?;
         let (controller, motion_s) = (request.controller.name(), plan.trajectory.duration_s());
         let (scenario, is_waived) = (&plan.scenario, request.without_bring_up);
@@ -56,12 +51,19 @@ impl PreparedRun {
         let domain = match request.clock {
             ClockKind::Virtual => None,
             ClockKind::Auto | ClockKind::Rt | ClockKind::Lockstep => {
+                room::check_open_files().usage()?;
                 // This also removes what killed runs left.
                 let domain = supervisor::reserve_domain(request.name.as_deref()).usage()?;
                 room::check_shared_memory().usage()?;
                 Some(domain)
             }
         };
+        Ok(Self { plan, request, domain })
+    }
+
+    /// Makes the folder, and plays the motion to its end.
+    pub(crate) fn play(self, interrupts: &Interrupts) -> Result<PlayedRun, Failure> {
+        let Self { plan, request, domain } = self;
         let folder = match &request.out {
             Some(path) => RunFolder::create(path).usage()?,
             None => RunFolder::create_in(RUNS.as_ref(), &plan.scenario.name).usage()?,
@@ -71,17 +73,11 @@ impl PreparedRun {
         if !request.quiet {
             status!("{}", plan.announcement());
         }
-        let manifest = manifest_of(&plan, &request.controller, request.clock);
+        let mut manifest = manifest_of(&plan, &request.controller, request.clock);
         // This one remains if the supervisor is killed.
         write_manifest(&folder, &manifest)?;
         let no_room = || format!("no room in {} for the verdict", folder.path().display());
         let reserve = Reserve::allocate_in(folder.path()).with_context(no_room).incomplete()?;
-        Ok(Self { plan, request, domain, folder, manifest, reserve, occupied })
-    }
-
-    /// Plays the motion to its end.
-    pub(crate) fn play(self, interrupts: &Interrupts) -> Result<PlayedRun, Failure> {
-        let Self { plan, request, domain, folder, mut manifest, reserve, occupied } = self;
         let ran = match domain {
             None => {
                 let build = request.controller.builder().expect("the clock is checked");

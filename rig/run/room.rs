@@ -23,13 +23,18 @@ const LEAST_MEMORY: [(Resource, &str, &str, u64); 2] =
 /// The least number of open files of a process: the recorder of a run with eight live clients has 74.
 const LEAST_FILES: u64 = 128;
 
-/// Refuses limits under which a process would die of its next allocation, or of its next file.
-pub(super) fn check_limits() -> anyhow::Result<()> {
+/// Refuses a limit under which a process would die of its next file.
+pub(super) fn check_open_files() -> anyhow::Result<()> {
     let files = getrlimit(Resource::Nofile).current.unwrap_or(u64::MAX);
     ensure!(
         files >= LEAST_FILES,
         "a process may open {files} files, and a run needs {LEAST_FILES}: raise the limit ('ulimit -n 1024')"
     );
+    Ok(())
+}
+
+/// Refuses limits under which a process would die of its next allocation.
+pub(super) fn check_memory_limits() -> anyhow::Result<()> {
     for (resource, name, option, least) in LEAST_MEMORY {
         let limit = getrlimit(resource).current.unwrap_or(u64::MAX);
         ensure!(
@@ -85,7 +90,9 @@ pub(super) fn check_shared_memory() -> anyhow::Result<()> {
 fn require_writable(folder: &Path) -> anyhow::Result<()> {
     let unwritable = || {
         let folder = folder.display();
-        format!("{folder} takes no files, and a rig needs it for its messages; --clock virtual needs none")
+        format!(
+            "{folder} takes no files, and a rig needs it for its messages; --clock virtual needs no shared memory"
+        )
     };
     tempfile::tempfile_in(folder).map(drop).with_context(unwritable)
 }

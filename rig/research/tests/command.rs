@@ -161,7 +161,7 @@ fn folders_and_values_that_cannot_be_used_are_refused() {
     fs::write(&file, "").unwrap();
     let output = study(&file.join("below"), &[]);
     assert_eq!(output.status.code(), Some(2));
-    assert!(stderr(&output).contains("cannot create"), "{}", stderr(&output));
+    assert!(stderr(&output).contains("is no folder"), "{}", stderr(&output));
     assert!(!stderr(&output).contains("random guesses"), "the work had begun: {}", stderr(&output));
     let free = place.path().join("free");
     for wrong in [["--samples", "0"], ["--cells", "1"], ["--trajectory", "/nowhere.csv"]] {

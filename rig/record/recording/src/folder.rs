@@ -146,10 +146,12 @@ impl RunFolder {
         write_whole(path, content)
     }
 
-    /// Shows others that its run goes on, until the file is dropped or the process has died. None where the file system
-    /// has no locks.
+    /// Shows others that its run goes on, until the file is dropped or the process has died. None where the file
+    /// cannot be locked.
     pub fn occupy(&self) -> Option<File> {
-        File::open(self.scenario()).ok().filter(|file| file.try_lock().is_ok())
+        // Open for writing: NFS locks no other file.
+        let scenario = File::options().read(true).write(true).open(self.scenario());
+        scenario.ok().filter(|file| file.try_lock().is_ok())
     }
 
     /// Whether its run goes on.
@@ -255,7 +257,7 @@ pub fn new_file(path: &Path) -> Result<File, OutputError> {
 pub fn new_folder(path: &Path) -> Result<(), OutputError> {
     if let Some(parent) = path.parent() {
         fs::create_dir_all(parent).map_err(|error| match error.kind() {
-            ErrorKind::AlreadyExists => OutputError::NoFolder(parent.to_owned()),
+            ErrorKind::AlreadyExists | ErrorKind::NotADirectory => OutputError::NoFolder(parent.to_owned()),
             _ => OutputError::Create { path: path.to_owned(), error },
         })?;
     }
