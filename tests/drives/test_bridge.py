@@ -179,6 +179,24 @@ def test_a_bus_that_takes_no_frame_does_not_hold_up_the_end(drives: Maker) -> No
         stuck.is_free.set()
 
 
+def test_a_thread_left_behind_takes_no_bus_from_a_newer_bridge(drives: Maker) -> None:
+    before = set(threading.enumerate())
+    with Stuck() as stuck:
+        old = drives("old", nodes=[1])
+        old.serve(stuck)
+        assert stuck.waits.wait(30)
+        old.shutdown()
+        left = set(threading.enumerate()) - before
+        assert left
+        drives("newer", nodes=[1]).serve(stuck)
+        stuck.is_free.set()
+        for way in left:
+            way.join(30)
+            assert not way.is_alive()
+        with pytest.raises(SettingError, match="joined to this bus already"):
+            drives("newest", nodes=[1]).serve(stuck)
+
+
 def test_an_error_of_the_other_bus_reaches_the_user_with_its_cause(drives: Maker, caplog: pytest.LogCaptureFixture) -> None:
     bus = drives("failed", nodes=[1])
     before = set(threading.enumerate())
@@ -192,6 +210,7 @@ def test_an_error_of_the_other_bus_reaches_the_user_with_its_cause(drives: Maker
     assert "bridge to Virtual bus channel fails ended" in caplog.text
     for way in ways:
         way.join(30)
+        assert not way.is_alive()
     with ExitStack() as others:
         for _ in range(7):
             others.enter_context(Drives("failed"))

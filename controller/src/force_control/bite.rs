@@ -1,4 +1,4 @@
-//! A bite, and the probe before the first one, as their force shows them: phases, desired force and damping.
+//! A bite, and the probe before the first one: phases, desired force and damping, which follow from the measured force.
 
 use masseter_runtime::messages::codes::{Cause, ControllerState};
 use masseter_scenario::{BiteProfile, ForceControlConfig, ForceSource, Scenario};
@@ -65,6 +65,7 @@ pub(super) struct Bite {
     cell_doubt_n: f64,
     /// Height of the platform in the closed mouth, m.
     closed_m: f64,
+    /// The largest stiffness between the teeth so far, from force and height of the jaw.
     pub stiffness: ShownStiffness,
     pub phase: Phase,
     /// Bite forces of the last cycles, the newest first, N.

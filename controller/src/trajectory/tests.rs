@@ -104,8 +104,23 @@ fn a_motion_whose_duration_holds_no_whole_cycle_is_known_to_be_cut() {
 #[test]
 fn every_generator_passes_the_check_with_its_defaults() {
     for motion in generators() {
-        let report = judge(&build(&motion, None)).unwrap_or_else(|error| panic!("{motion:?}: {error}"));
+        let trajectory = build(&motion, None);
+        let report = judge(&trajectory).unwrap_or_else(|error| panic!("{motion:?}: {error}"));
         assert!(report.margin_m(mechanism().strokes()).iter().all(|&margin_m| margin_m > 0.0));
+        // A cycle that is left out of a movement shows as a jump of the speed.
+        let ways = axes(&trajectory, PERIOD_S);
+        let speeds = differences(&ways, PERIOD_S);
+        let most = |values: &[SVector<f64, AXES>]| {
+            values.iter().fold(SVector::zeros(), |most, value| value.abs().sup(&most))
+        };
+        for (found, expected) in [
+            (report.lowest_m, ways.iter().fold(ways[0], |least, way| least.inf(way))),
+            (report.highest_m, ways.iter().fold(ways[0], |most, way| most.sup(way))),
+            (report.velocity_m_s, most(&speeds)),
+            (report.acceleration_m_s2, most(&differences(&speeds, PERIOD_S))),
+        ] {
+            assert!((SVector::from(found) - expected).amax() < 1e-9, "{motion:?}: {found:?}, {expected}");
+        }
     }
 }
 

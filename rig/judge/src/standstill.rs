@@ -38,7 +38,7 @@ pub struct StandstillFigures {
 
 /// Longest time from the stop to the loss of power; a drive that is not heard of says nothing of its power, ns.
 const POWER_OFF_WITHIN_NS: u64 = 100 * MILLISECOND_NS;
-/// From the stop until an axis that ran into its brake stands, ns.
+/// From the stop until an axis that ran into its brake is at rest, ns.
 const SETTLED_NS: u64 = 150 * MILLISECOND_NS;
 /// Share of the time after the stop that must be recorded: a plant that loses cycles records a little less.
 const LEAST_SHARE: f64 = 0.9;

@@ -19,7 +19,7 @@ pub(crate) struct Case {
     /// Its values of a matrix, each as `KEY=VALUE`.
     pub(crate) set: Vec<String>,
     pub(crate) tags: Vec<String>,
-    /// Whether its file cannot be read, so that nobody knows its tags.
+    /// Whether its file cannot be read. Its tags are unknown then.
     is_unread: bool,
     /// Whether it cannot run in one thread.
     pub(crate) needs_processes: bool,

@@ -7,6 +7,7 @@ use serde::{Deserialize, de::DeserializeOwned};
 use serde_json::Value;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, Deserializer, Error};
+use toml::value::Datetime;
 
 use super::error::ScenarioError;
 use crate::{input::excerpt, wording::question};
@@ -15,6 +16,8 @@ use crate::{input::excerpt, wording::question};
 const MOST_SUSPECTS: usize = 100;
 /// Beginning of a message on an unknown key.
 const UNKNOWN_KEY: &str = "unknown key";
+/// What a value is that should be one of some names.
+const NO_NAME: &str = "no name; write it in quotes";
 /// Characters of the longest message of the TOML reader.
 const LONGEST_REASON: usize = 2000;
 
@@ -41,6 +44,14 @@ impl<'a> Document<'a> {
             table = in_list.unwrap_or(value).get_ref().as_table();
         }
         found.map_or_else(|| self.path.display().to_string(), |offset| place_in(self.path, self.text, offset))
+    }
+
+    /// The value of a key outside of lists, as it is written.
+    fn written(&self, key: &str) -> Option<&'a str> {
+        let mut names = key.split('.');
+        let value = self.root.get(names.next()?)?;
+        let value = names.try_fold(value, |value, name| value.get_ref().as_table()?.get(name))?;
+        self.text.get(value.span())
     }
 
     /// The key of the value at an offset, with the tables around.
@@ -149,18 +160,17 @@ pub(super) fn malformed<T: DeserializeOwned>(
 ) -> ScenarioError {
     let offset = error.span().map_or(0, |span| span.start);
     let mut place = place_in(path, text, offset);
-    let mut reason = in_words(error.message().lines().next().unwrap_or_default());
-    if let Some(twice) = error.span().filter(|_| reason == "duplicate key").and_then(|span| text.get(span)) {
-        reason = format!("{}: the key is there already", excerpt(twice));
-    }
+    let mut written = error.span().and_then(|span| text.get(span)).unwrap_or_default();
     let key = document.and_then(|document| {
         let key = document.key_at(offset)?;
         let culprit = document.culprit::<T>(&key);
         if let Some(culprit) = &culprit {
             place = document.place_of(culprit, None);
+            written = document.written(culprit).unwrap_or_default();
         }
         Some(culprit.unwrap_or(key))
     });
+    let mut reason = in_words(error.message().lines().next().unwrap_or_default(), written);
     if let Some(key) = key {
         match (reason.strip_prefix(UNKNOWN_KEY), document) {
             // Serde reads some tables whole, and places their keys at the table.
@@ -177,20 +187,30 @@ pub(super) fn malformed<T: DeserializeOwned>(
 }
 
 /// A message of the TOML reader in the words of the documents, with the most similar of the expected keys or values.
-fn in_words(message: &str) -> String {
+/// `written` is the text that the message is about.
+fn in_words(message: &str, written: &str) -> String {
     let message = cut_quotations(message);
     let known = [("unknown field", UNKNOWN_KEY), ("unknown variant", "unknown value")];
     let known = known.iter().find_map(|(of_reader, ours)| Some((*ours, message.strip_prefix(of_reader)?)));
     let Some((ours, rest)) = known else {
-        return of_type(&message).unwrap_or_else(|| message.replace('`', "'"));
+        return of_type(&message, written).unwrap_or_else(|| message.replace('`', "'"));
     };
     let mut names = rest.split('`').skip(1).step_by(2);
     let question = names.next().map_or_else(String::new, |unknown| question(unknown, names));
     format!("{ours}{}{question}", rest.replace('`', "'"))
 }
 
-/// A message of the TOML reader on a value of another type, or on an absent key, without the names of types in Rust.
-fn of_type(message: &str) -> Option<String> {
+/// A message of the TOML reader on a wrong value, or on a key that is absent or there twice, without the names of types in
+/// Rust.
+fn of_type(message: &str, written: &str) -> Option<String> {
+    let is_date = written.parse::<Datetime>().is_ok();
+    let quoted = if is_date { format!("the date {written}") } else { excerpt(written) };
+    match message {
+        "duplicate key" => return Some(format!("{quoted}: the key is there already")),
+        "wanted string or table" => return Some(format!("{quoted} is {NO_NAME}")),
+        "integer number overflowed" => return Some(format!("{quoted} has too many digits")),
+        _ => {}
+    }
     if let Some(key) = message.strip_prefix("missing field ") {
         return Some(format!("the key {} is missing", key.replace('`', "'")));
     }
@@ -199,40 +219,42 @@ fn of_type(message: &str) -> Option<String> {
         .find_map(|beginning| message.strip_prefix(beginning))?;
     let (given, expected) = rest.rsplit_once(", expected ")?;
     let given = match given {
+        _ if is_date => quoted,
         "map" => "a table".to_owned(),
         "sequence" => "a list".to_owned(),
         _ if given.starts_with('"') || given.starts_with("string ") => given.replacen("string ", "", 1),
         _ if given.bytes().all(|byte| byte.is_ascii_digit()) => format!("a list of {given}"),
-        _ => given.split('`').nth(1)?.to_owned(),
+        _ => given.split('`').nth(1).unwrap_or(given).to_owned(),
     };
-    Some(format!("{given} is {}", no_value_of(expected)?))
+    let is_not = no_value_of(expected, &given);
+    Some(format!("{given} is {is_not}"))
 }
 
-/// That something is no value of a type in Rust.
-fn no_value_of(expected: &str) -> Option<String> {
-    let whole = |least: i64, most: u64| format!("no whole number from {least} to {most}");
-    Some(match expected {
-        "u8" => whole(0, u8::MAX.into()),
-        "u16" => whole(0, u16::MAX.into()),
-        "u32" => whole(0, u32::MAX.into()),
-        "u64" | "usize" => whole(0, u64::MAX),
-        "i8" => whole(i8::MIN.into(), 127),
-        "i16" => whole(i16::MIN.into(), 32_767),
-        "i32" => whole(i32::MIN.into(), 2_147_483_647),
-        "i64" => "no whole number".to_owned(),
-        "f64" => "no number".to_owned(),
-        "a string" | "string" => "no text; write it in quotes".to_owned(),
-        "a boolean" => "neither true nor false".to_owned(),
-        "a sequence" => "no list; write it in brackets, and a list of tables as [[NAME]]".to_owned(),
-        "a map" => "no table".to_owned(),
-        _ if expected.starts_with("struct ") || expected.starts_with("internally tagged ") => {
-            "no table".to_owned()
+/// Why what was given is no value of a type in Rust. The ranges of those types are wider than those of the keys.
+fn no_value_of(expected: &str, given: &str) -> String {
+    let is_whole = |digits: &str| digits.bytes().all(|byte| byte.is_ascii_digit());
+    let reason = match expected {
+        "u8" | "u16" | "u32" | "u64" | "usize" | "i8" | "i16" | "i32" | "i64" => {
+            match given.strip_prefix('-') {
+                Some(digits) if is_whole(digits) => "too small",
+                None if is_whole(given) => "too large",
+                _ => "no whole number",
+            }
         }
-        _ => {
-            let length = expected.strip_prefix("an array of length ")?;
-            format!("no list of {}", length.split(' ').next()?)
-        }
-    })
+        "f64" => "no number",
+        "a string" | "string" => "no text; write it in quotes",
+        "a boolean" => "neither true nor false",
+        "a sequence" => "no list; write it in brackets, and a list of tables as [[NAME]]",
+        "a map" => "no table",
+        "variant identifier" | "string or map" => NO_NAME,
+        _ if expected.starts_with("struct ") || expected.starts_with("internally tagged ") => "no table",
+        _ => match (expected.strip_prefix("an array of length "), expected.strip_prefix("a number ")) {
+            (Some(length), _) => return format!("no list of {}", length.split(' ').next().unwrap_or(length)),
+            (_, Some(rest)) => return format!("no number {rest}"),
+            _ => "no value of this key",
+        },
+    };
+    reason.to_owned()
 }
 
 /// A message of the TOML reader with every quotation cut.

@@ -27,6 +27,8 @@ class Bridge:
         self._error: Exception | None = None
         #: Taken by the thread that ends first.
         self._ended = threading.Semaphore(1)
+        #: Taken by the thread that frees the places: a bus may be on a newer bridge once they are free.
+        self._left = threading.Semaphore(1)
         _joined.add(other)
         ways = [(own, other), (other, own)]
         self._threads = [threading.Thread(target=self._carry, args=way, name=self._about, daemon=True) for way in ways]
@@ -58,8 +60,9 @@ class Bridge:
                 self._leave()
 
     def _leave(self) -> None:
-        _joined.discard(self._other)
-        self._own.shutdown()
+        if self._left.acquire(blocking=False):
+            _joined.discard(self._other)
+            self._own.shutdown()
 
     def check(self) -> None:
         """Raises the error that has ended the bridge."""

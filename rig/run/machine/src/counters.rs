@@ -22,7 +22,7 @@ fn stat_field(stat: &str, number: usize) -> Option<&str> {
 /// The kernel's counters of a process, or of one of its threads.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Counters {
-    /// CPU time, ns, of a process that of all threads that run; `None` if the kernel has no statistics of its scheduler.
+    /// CPU time, ns; for a process, that of all its threads that run. `None` if the kernel has no statistics of its scheduler.
     pub cpu_ns: Option<u64>,
     /// Time for which the thread was ready and had no core, ns; none as above. It grows when the thread gets a core.
     pub queued_ns: Option<u64>,

@@ -235,7 +235,7 @@ fn absolute(path: &Path) -> anyhow::Result<PathBuf> {
     let absolute = path.canonicalize().with_context(|| format!("cannot read '{}'", path.display()))?;
     // The manifest is written down with it.
     let is_text = absolute.to_str().is_some();
-    ensure!(is_text, "{}: use folders and a file whose names are UTF-8", path.display());
+    ensure!(is_text, "cannot use '{}': choose folders and a file whose names are UTF-8", path.display());
     Ok(absolute)
 }
 

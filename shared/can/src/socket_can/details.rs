@@ -1,4 +1,4 @@
-//! The settings and the state of a CAN interface in the kernel: settings, state and queue, asked over rtnetlink. This module judges nothing.
+//! Settings, state and queue of a CAN interface in the kernel, asked over rtnetlink. This module judges nothing.
 
 use std::fmt::{self, Display, Formatter};
 use std::{fs, io, path::Path};

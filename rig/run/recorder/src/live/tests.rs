@@ -175,7 +175,9 @@ fn a_client_that_never_answers_the_close_keeps_no_place() {
     let _client = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
     let (stream, _) = listener.accept().unwrap();
     stream.set_read_timeout(Some(INTERVAL)).unwrap();
-    assert!(Socket::new(stream, Vec::new()).close_after_all().is_err());
+    let closing = thread::spawn(|| Socket::new(stream, Vec::new()).close_after_all());
+    assert!(comes_true(|| closing.is_finished()), "the server still waits for the client");
+    assert!(closing.join().unwrap().is_err());
 }
 
 /// Whether the condition comes true within a generous time.
