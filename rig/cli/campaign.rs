@@ -112,8 +112,8 @@ pub(super) fn search(args: &SearchArgs) -> Result<Exit, Failure> {
         return Ok(Exit::Interrupted);
     };
     let found = match (first, runs - judged) {
-        (Some(first), _) => format!("below zero after {first} runs\n"),
-        (None, 0) => format!("nothing below zero in {runs} runs\n"),
+        (Some(first), _) => format!("below zero after {}\n", counted(first as u64, "run")),
+        (None, 0) => format!("nothing below zero in {}\n", counted(runs as u64, "run")),
         (None, others) => format!("nothing below zero in {runs} runs, of which {others} were not judged\n"),
     };
     let again = worst.first().map_or_else(String::new, |worst| format!("again: {}\n", worst.command));
