@@ -1,7 +1,7 @@
 //! Runs in real time that the user ends, by a key, a signal or a closed terminal, before or during the motion.
 
 use std::fs;
-use std::os::unix::process::CommandExt;
+use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::process::{Child, Stdio};
 use std::time::Duration;
 
@@ -64,6 +64,18 @@ fn an_interrupt_before_anything_is_recorded_ends_the_run_in_order() {
         kill_process_group(Pid::from_child(&child), Signal::INT).unwrap();
         ended(child, 130);
     }
+}
+
+/// The motion of a day takes many seconds to plan.
+#[test]
+fn an_interrupt_while_a_run_is_prepared_ends_it_at_once_and_leaves_no_folder() {
+    let workspace = Workspace::new("duration_s = 86400.0\n");
+    let mut child = workspace.start_virtual();
+    clock::sleep(Duration::from_millis(500));
+    kill_process(Pid::from_child(&child), Signal::INT).unwrap();
+    wait_until("the signal ends the process", || child.try_wait().unwrap().is_some());
+    assert_eq!(child.wait().unwrap().signal(), Some(Signal::INT.as_raw()));
+    assert!(!workspace.run_folder().exists());
 }
 
 #[test]

@@ -27,9 +27,9 @@ pub(crate) struct PlayedRun {
     folder: RunFolder,
     manifest: Manifest,
     /// The summary's room on the disk.
-    reserved: std::fs::File,
+    reserved: fs::File,
     /// Until the run is reported.
-    occupied: Option<std::fs::File>,
+    occupied: Option<fs::File>,
     /// For those who watched.
     report_server: Option<masseter_recorder::live::ReportServer>,
     /// Whether the manifest was written.

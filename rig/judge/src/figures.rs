@@ -159,3 +159,36 @@ impl Figures {
         ends.map(|event| event.time_ns).min().or(self.stop_without_event_ns)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use masseter_runtime::messages::Event;
+    use masseter_runtime::messages::codes::{EventKind, Source};
+
+    use super::*;
+
+    fn event(time_ns: u64, kind: EventKind, cause: Cause, to: ControllerState) -> EventRecord {
+        let states = (ControllerState::Running.code(), to.code());
+        let event = Event::new(Source::Controller, kind, cause);
+        EventRecord::from(&Event { time_ns, from: states.0, to: states.1, ..event })
+    }
+
+    /// After a stop by request the motion comes to rest, and what acts meanwhile acts on the motion.
+    #[test]
+    fn entries_act_until_a_safe_stop_or_until_the_drives_are_switched_off() {
+        let request = event(100, EventKind::Notice, Cause::StopRequested, ControllerState::Running);
+        let holding = event(200, EventKind::Transition, Cause::Sequence, ControllerState::Holding);
+        let disabling = event(300, EventKind::Transition, Cause::Sequence, ControllerState::Disabling);
+        let safe_stop = event(150, EventKind::Fault, Cause::MasterFault, ControllerState::SafeStop);
+        for (what, events, quiet_ns, expected) in [
+            ("the end of a whole motion is no stop", vec![&holding, &disabling], None, None),
+            ("a request", vec![&request, &holding, &disabling], None, Some(300)),
+            ("a safe stop after a request", vec![&request, &safe_stop], None, Some(150)),
+            ("a program switches off", vec![], Some(50), Some(50)),
+        ] {
+            let events = events.into_iter().cloned().collect();
+            let figures = Figures { events, stop_without_event_ns: quiet_ns, ..Figures::default() };
+            assert_eq!(figures.last_act_ns(), expected, "{what}");
+        }
+    }
+}
