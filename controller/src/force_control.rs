@@ -90,7 +90,8 @@ impl ForceControl {
 
     /// Velocity at which the jaw leaves its lateral way from the motion, m/s.
     fn back_to_side_m_s(&self) -> Vector2<f64> {
-        (self.offsets_m[0].xy() / CATCH_UP_S).cap_magnitude(self.bite.config.closing_m_s)
+        // A period that is longer than the time is all of the way.
+        (self.offsets_m[0].xy() / CATCH_UP_S.max(self.period_s)).cap_magnitude(self.bite.config.closing_m_s)
     }
 
     /// The desired velocity in this phase, m/s. A lateral force moves the jaw only in a bite: later nothing holds the jaw

@@ -14,10 +14,11 @@ use rayon::prelude::*;
 use self::cases::Case;
 use crate::prelude::*;
 use crate::run::request::ClockKind;
+use crate::run::runner::{Runner, Source};
 
 /// How the scenarios of a suite are run.
 pub(crate) struct Suite<'a> {
-    pub(crate) runner: crate::run::runner::Runner,
+    pub(crate) runner: Runner,
     /// The clock of the scenarios that can have it.
     pub(crate) clock: ClockKind,
     /// How often a run with processes is tried again: see [`asks_for_another`].
@@ -92,7 +93,7 @@ impl Suite<'_> {
 
     /// Runs a scenario without a recording. One that does not pass is run again with a recording: the same bytes.
     fn in_virtual_time(&self, case: &Case) -> Attempt {
-        let played = self.runner.play(crate::run::runner::Source::File(case.file()));
+        let played = self.runner.play(Source::File(case.file()));
         let attempt = attempt(played.map(|judged| judged.verdict), None);
         let Ok(unrecorded) = &attempt.verdict else { return attempt };
         if !attempt.is_short(self.allows_untested) || self.runner.is_interrupted() {

@@ -16,6 +16,7 @@ use masseter_report::why::{Detected, Instant, Interval, Left, Look, Why};
 use masseter_runtime::injection::{Injected, Withdrawn};
 use masseter_runtime::messages::codes::{Cause, ControllerState, EventKind};
 use masseter_runtime::named::Declared;
+use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use masseter_virtual_time::{Branches, Mark, Requests, Run, Without};
 
 use crate::prelude::*;
@@ -76,7 +77,7 @@ fn check_entries(scenario: &Scenario, without: &Without) -> anyhow::Result<()> {
 /// The digest of the run as it was judged.
 fn digest_of(folder: &RunFolder) -> anyhow::Result<String> {
     let path = folder.summary();
-    let summary = masseter_scenario::input::read_text(&path, masseter_scenario::input::MOST_KEPT_BYTES);
+    let summary = read_text(&path, MOST_KEPT_BYTES);
     let summary = summary
         .with_context(|| format!("{} is needed: 'masseter report' writes it again", path.display()))?;
     let summary: serde_json::Value =

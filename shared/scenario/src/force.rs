@@ -57,18 +57,17 @@ impl ForceEstimateConfig {
         if self.fusion == ForceFusion::None {
             return Ok(());
         }
-        let LoadCellConfig { noise_n, offset_n, range_n, .. } =
-            *require_cell("force_estimate.fusion", cell, is_emulated, "none")?;
+        let cell = require_cell("force_estimate.fusion", cell, is_emulated, "none")?;
         let need = "use a time without contact: the fusion tares the load cell in this time";
         require(self.calibration_s > 0.0, "force_estimate.calibration_s", &self.calibration_s, need)?;
         let need = "use the noise of the cell: the fusion weights the cell by it, and without noise a cell that sticks looks sound";
-        require(noise_n > 0.0, "load_cell.noise_n", &noise_n, need)?;
-        let least_range_n = 1.2 * peak_n + offset_n.abs() + 5.0 * noise_n;
+        require(cell.noise_n > 0.0, "load_cell.noise_n", &cell.noise_n, need)?;
+        let least_range_n = cell.least_range_n(peak_n);
         let need = format!(
             "use more than {least_range_n} N, offset and five times the noise, and 1.2 times the peak of a controlled bite: \
              this cell comes to the end of its range"
         );
-        require(range_n > least_range_n, "load_cell.range_n", &range_n, need)
+        require(cell.range_n > least_range_n, "load_cell.range_n", &cell.range_n, need)
     }
 }
 
@@ -277,12 +276,17 @@ impl LoadCellConfig {
         1.0 / (TAU * self.bandwidth_hz)
     }
 
+    /// The range that a bite of this peak needs, N.
+    fn least_range_n(&self, peak_n: f64) -> f64 {
+        1.2 * peak_n + self.offset_n.abs() + 5.0 * self.noise_n
+    }
+
     /// Refuses a cell that cannot measure a bite for this control. The range must exceed the peak; offset and noise
     /// must not look like a contact.
     pub(super) fn require_for(&self, control: &ForceControlConfig) -> Checked {
         let Self { noise_n, offset_n, range_n, .. } = *self;
         let [most_offset_n, most_noise_n] = [control.contact_n / 2.0, control.contact_n / 5.0];
-        let least_range_n = 1.2 * control.peak_n + offset_n.abs() + 5.0 * noise_n;
+        let least_range_n = self.least_range_n(control.peak_n);
         let need = format!(
             "use less than {most_offset_n} N on both sides, half of force_control.contact_n: with more, the controller \
              takes the offset for a contact, or misses one"

@@ -161,15 +161,32 @@ fn a_drive_that_has_lost_the_master_stops_the_others_by_its_emergency() {
     assert_eq!((stop.axis, stop.value, stop.limit), (3, f64::from(0x8130), 17.0));
 }
 
-/// Such a drive is off, and moves nothing.
+/// Such a drive is off, or is about to be, and moves nothing.
 #[test]
-fn a_lost_master_is_no_fault_of_drives_that_are_off() {
+fn a_lost_master_is_no_fault_of_drives_that_are_off_or_go_off() {
+    for off_cycles in [1, 300] {
+        let mut bench = Bench::enabled();
+        bench.cycles(off_cycles, DriveRequest::Off);
+        let is_enabled = bench.all_are(DriveState::OperationEnabled);
+        assert_eq!(is_enabled, off_cycles == 1, "the drives take a moment");
+        let (now_ns, id) = (bench.now_ns(), bench.drive(3).id);
+        let silent = Emergency { code: EmergencyCode::HEARTBEAT, register: 0x11, vendor: [0; 5] };
+        bench.wires.wire(1).arrive(now_ns, silent.frame(id));
+        bench.cycle(Some(DriveRequest::Off));
+        assert_eq!(bench.reading.master_fault, 0, "after {off_cycles} cycles");
+    }
+}
+
+#[test]
+fn a_lost_master_is_no_fault_of_drives_that_are_not_enabled_yet() {
     let mut bench = Bench::enabled();
     bench.cycles(300, DriveRequest::Off);
+    bench.cycle(Some(DriveRequest::Enable));
+    assert!(!bench.all_are(DriveState::OperationEnabled));
     let (now_ns, id) = (bench.now_ns(), bench.drive(3).id);
     let silent = Emergency { code: EmergencyCode::HEARTBEAT, register: 0x11, vendor: [0; 5] };
     bench.wires.wire(1).arrive(now_ns, silent.frame(id));
-    bench.cycle(Some(DriveRequest::Off));
+    bench.cycle(Some(DriveRequest::Enable));
     assert_eq!(bench.reading.master_fault, 0);
 }
 

@@ -145,8 +145,8 @@ pub enum SnapshotProblem {
 #[derive(Debug, Clone)]
 pub struct Snapshot {
     pub(crate) scenario: Arc<Scenario>,
-    pub(crate) stepper: crate::stepper::StepperState,
-    pub(crate) latest: crate::log::Latest,
+    pub(crate) stepper: StepperState,
+    pub(crate) latest: Latest,
     pub(crate) has_failed: bool,
 }
 

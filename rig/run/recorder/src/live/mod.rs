@@ -17,6 +17,7 @@ mod tests;
 
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicBool, AtomicU16, AtomicU64, Ordering};
+use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::thread::{self, JoinHandle};
 use std::{io, time::Duration};
@@ -108,7 +109,7 @@ pub(crate) struct LiveServer {
 struct Client {
     stream: TcpStream,
     /// None once the server closes.
-    queue: Option<std::sync::mpsc::SyncSender<Queued>>,
+    queue: Option<SyncSender<Queued>>,
     protocol: Protocol,
     /// One bit per topic that it subscribes to.
     subscribed: Arc<AtomicU16>,
@@ -131,7 +132,7 @@ impl Client {
         stream.set_write_timeout(Some(WRITE_TIMEOUT))?;
         stream.set_read_timeout(Some(INTERVAL))?;
         let socket = Socket::new(stream.try_clone()?, behind);
-        let (queue, queued) = std::sync::mpsc::sync_channel(QUEUE);
+        let (queue, queued) = sync_channel(QUEUE);
         let subscribed = Arc::new(AtomicU16::new(0));
         let published = Arc::clone(&subscribed);
         let serve = move || {
@@ -149,7 +150,7 @@ impl Client {
     fn offer(&self, message: &Recorded, log_time_ns: u64) -> bool {
         let is_subscribed = self.subscribed.load(Ordering::Relaxed) & bit(message.topic()) != 0;
         let Some(queue) = self.queue.as_ref().filter(|_| is_subscribed) else { return true };
-        !matches!(queue.try_send((log_time_ns, *message)), Err(std::sync::mpsc::TrySendError::Full(_)))
+        !matches!(queue.try_send((log_time_ns, *message)), Err(TrySendError::Full(_)))
     }
 
     fn is_subscribed(&self) -> bool {

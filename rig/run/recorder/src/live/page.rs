@@ -3,6 +3,8 @@
 //! The page is that of the report, filled with the figures so far; the feed computes them. An update changes what has changed.
 //! A page that falls behind loads itself again.
 
+use std::sync::mpsc::{Receiver, TryRecvError};
+
 use masseter_runtime::clock::{self, SECOND_NS};
 use masseter_runtime::{conversation::Conversation, named::access};
 use serde_json::json;
@@ -49,12 +51,12 @@ impl Session {
     }
 
     /// Serves the page until the run is over.
-    pub(super) fn serve(mut self, queue: &std::sync::mpsc::Receiver<Queued>) -> Result<(), Disconnected> {
+    pub(super) fn serve(mut self, queue: &Receiver<Queued>) -> Result<(), Disconnected> {
         loop {
             if let Some(text) = self.socket.receive()? {
                 self.answer_request(&text)?;
             }
-            let is_over = matches!(queue.try_recv(), Err(std::sync::mpsc::TryRecvError::Disconnected));
+            let is_over = matches!(queue.try_recv(), Err(TryRecvError::Disconnected));
             if is_over {
                 self.host.feed.refresh();
             }
