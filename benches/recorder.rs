@@ -98,12 +98,12 @@ struct Publishers {
 impl Publishers {
     fn open(node: &Node) -> anyhow::Result<Self> {
         Ok(Self {
-            command: node.publisher()?,
-            reading: node.publisher()?,
-            state: node.publisher()?,
-            truth: node.publisher()?,
+            command: Publisher::open(node)?,
+            reading: Publisher::open(node)?,
+            state: Publisher::open(node)?,
+            truth: Publisher::open(node)?,
             frame: FramePublisher::open(node)?,
-            events: [node.publisher()?, node.publisher()?],
+            events: [Publisher::open(node)?, Publisher::open(node)?],
         })
     }
 

@@ -163,7 +163,7 @@ fn played_s(rig: &str) -> f64 {
     while clock::now_ns() < give_up_ns {
         // The rig's processes make its domain.
         let domain = Domain::named(rig).unwrap();
-        states = states.or_else(|| Node::join(&domain).ok()?.subscriber().ok());
+        states = states.or_else(|| Subscriber::open(&Node::join(&domain).ok()?).ok());
         while let Some(state) = states.as_ref().and_then(|states| states.receive().unwrap()) {
             motion_s = motion_s.max(state.motion_time_s);
             if state.controller_state == Finished as u32 {

@@ -69,7 +69,7 @@ impl Rig {
         // The rig has claimed its name, as one of its processes runs.
         let victim = child_of(&supervisor, role);
         let memory = SharedMemory::of_running(&name);
-        let states = Node::join(&Domain::named(&name).unwrap()).unwrap().subscriber().unwrap();
+        let states = Subscriber::open(&Node::join(&Domain::named(&name).unwrap()).unwrap()).unwrap();
         Self { memory, workspace, supervisor, victim, states }
     }
 

@@ -55,12 +55,12 @@ struct Ports {
 impl Ports {
     fn open(node: &Node) -> Result<Self, TransportError> {
         Ok(Self {
-            commands: node.newest_subscriber()?,
-            readings: node.publisher()?,
-            truths: node.publisher()?,
-            contacts: node.publisher()?,
+            commands: Subscriber::of_newest(node)?,
+            readings: Publisher::open(node)?,
+            truths: Publisher::open(node)?,
+            contacts: Publisher::open(node)?,
             frames: FramePublisher::open(node)?,
-            events: node.publisher()?,
+            events: Publisher::open(node)?,
         })
     }
 

@@ -7,13 +7,25 @@ use super::workspace::{crate_roots, list, metadata, text, within};
 
 /// The crates of the workspace that each crate may use, all by their folders. The root package may use all
 /// but the programs that a run does not need.
-const MAY_USE: [(&str, &[&str]); 29] = [
+const MAY_USE: [(&str, &[&str]); 31] = [
     ("shared/can", &[]),
     ("shared/model", &[]),
     ("shared/scenario", &["shared/can", "shared/model"]),
     // Asks for features of crates of others, and has no code.
     ("shared/features", &[]),
-    ("shared/runtime", &["shared/can", "shared/features", "shared/model", "shared/scenario"]),
+    ("shared/messages", &["shared/can", "shared/model", "shared/scenario"]),
+    ("shared/domain", &["shared/messages", "shared/scenario"]),
+    (
+        "shared/runtime",
+        &[
+            "shared/can",
+            "shared/domain",
+            "shared/features",
+            "shared/messages",
+            "shared/model",
+            "shared/scenario",
+        ],
+    ),
     // Stands in for a crate of crates.io.
     ("shared/no_bindgen", &[]),
     ("controller", &["shared/can", "shared/model", "shared/scenario", "shared/runtime"]),

@@ -117,8 +117,8 @@ impl Numbered for Reading {
 }
 
 fn rig_ends<Sent: Numbered, Got: Numbered>(node: &Node) -> Failable<Ends> {
-    let mut publisher: Publisher<Sent> = node.publisher()?;
-    let subscriber: Subscriber<Got> = node.newest_subscriber()?;
+    let mut publisher: Publisher<Sent> = Publisher::open(node)?;
+    let subscriber: Subscriber<Got> = Subscriber::of_newest(node)?;
     Ok(Ends {
         send: Box::new(move |number| {
             Ok(publisher.publish_by(clock::now_ns, |message| message.set_number(number))?)

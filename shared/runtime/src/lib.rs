@@ -9,8 +9,9 @@ pub mod conversation;
 pub mod injection;
 pub mod lifecycle;
 pub mod lockstep;
-pub mod messages;
 pub mod named;
 pub mod realtime;
 pub mod schedule;
 pub mod transport;
+
+pub use masseter_messages as messages;

@@ -12,7 +12,9 @@ use masseter_model::geometry::{Mechanism, MechanismConfig, Pose, Twist};
 use masseter_runtime::clock;
 use masseter_runtime::messages::{Command, Contact, Event, FrameTap, Reading, State, Truth};
 use masseter_runtime::realtime::Cycle;
-use masseter_runtime::transport::{FramePublisher, FrameSubscriber, Node, ScratchDomain, Topic};
+use masseter_runtime::transport::{
+    FramePublisher, FrameSubscriber, Node, Publisher, ScratchDomain, Subscriber, Topic,
+};
 use nalgebra::Vector6;
 
 struct Counting;
@@ -56,8 +58,8 @@ const LOAN_BYTES: u64 = 48;
 const PERIOD_NS: u64 = 200_000;
 
 fn check_topic<M: Topic>(node: &Node) {
-    let subscriber = node.subscriber::<M>().unwrap();
-    let mut publisher = node.publisher::<M>().unwrap();
+    let subscriber = Subscriber::<M>::open(node).unwrap();
+    let mut publisher = Publisher::<M>::open(node).unwrap();
     publisher.warm_up().unwrap();
     publisher.connect().unwrap();
     subscriber.connect().unwrap();
@@ -130,7 +132,7 @@ fn waiting_receiving_and_dynamics_allocate_nothing_and_sending_one_small_counter
     check_topic::<Event>(&node);
     check_dynamics();
 
-    let subscriber = node.subscriber::<Command>().unwrap();
+    let subscriber = Subscriber::<Command>::open(&node).unwrap();
     let mut cycle = Cycle::new(clock::now_ns() + PERIOD_NS, PERIOD_NS);
     let waiting = allocations_of(|| {
         for _ in 0..20 {

@@ -2,7 +2,9 @@
 
 use masseter_runtime::clock;
 use masseter_runtime::messages::Event;
-use masseter_runtime::transport::{FramePublisher, FrameSubscriber, Node, ScratchDomain, TransportError};
+use masseter_runtime::transport::{
+    FramePublisher, FrameSubscriber, Node, Publisher, ScratchDomain, Subscriber, TransportError,
+};
 use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};
 
 /// The error of `connect` when no file may be opened.
@@ -26,14 +28,14 @@ fn a_refused_connection_is_reported() {
     let domain = ScratchDomain::claim("test-connections").unwrap();
     {
         let node = Node::join(&domain).unwrap();
-        let publisher = node.publisher::<Event>().unwrap();
-        let _inlet = node.subscriber::<Event>().unwrap();
+        let publisher = Publisher::<Event>::open(&node).unwrap();
+        let _inlet = Subscriber::<Event>::open(&node).unwrap();
         assert_tells(&refused(|| publisher.connect()), "event");
     }
     {
         let node = Node::join(&domain).unwrap();
-        let subscriber = node.subscriber::<Event>().unwrap();
-        let mut publisher = node.publisher::<Event>().unwrap();
+        let subscriber = Subscriber::<Event>::open(&node).unwrap();
+        let mut publisher = Publisher::<Event>::open(&node).unwrap();
         assert_tells(&refused(|| subscriber.receive()), "event");
         publisher.publish_by(clock::now_ns, |_| {}).unwrap();
         assert_tells(&subscriber.receive().unwrap_err().to_string(), "event");

@@ -20,7 +20,7 @@ use masseter_runtime::messages::{
     Command, Contact, Event, FrameTap, LAYOUT_VERSION, Machine, Message, Parameters, Reading, Signals, State,
     Truth,
 };
-use masseter_runtime::transport::{Domain, FrameSubscriber, Node, Topic, TransportError};
+use masseter_runtime::transport::{Domain, FrameSubscriber, Node, Subscriber, Topic, TransportError};
 use masseter_runtime::{clock, lockstep::RecorderSignals, named::Declared, realtime::scheduling::keep_off};
 use masseter_terminal::{Exit, StderrWriter};
 
@@ -165,7 +165,7 @@ fn drains_of_topics(node: &Node) -> Result<Vec<Drain>, TransportError> {
 
 /// Drains at most a queue's length, so that a flood cannot delay the other topics.
 fn drain_of<M: Topic + Into<Recorded> + 'static>(node: &Node) -> Result<Drain, TransportError> {
-    let subscriber = node.subscriber::<M>()?;
+    let subscriber = Subscriber::<M>::open(node)?;
     Ok(Box::new(move |take| {
         for _ in 0..M::DEPTH {
             let Some(message) = subscriber.receive()? else { break };

@@ -32,12 +32,13 @@ impl Ports {
     /// processes before the first cycle, because a connection makes and maps files.
     pub(super) fn open(context: &ProcessContext, declared: &Declared) -> Result<(Self, u64), ProcessError> {
         let (node, scenario, schedule) = (&context.node, &context.scenario, &context.schedule);
-        let readings = node.newest_subscriber()?;
-        let (commands, states) = (node.publisher::<Command>()?, node.publisher::<State>()?);
-        let signals = if declared.signals.is_empty() { None } else { Some(node.publisher::<Signals>()?) };
+        let readings = Subscriber::of_newest(node)?;
+        let (commands, states) = (Publisher::<Command>::open(node)?, Publisher::<State>::open(node)?);
+        let signals =
+            if declared.signals.is_empty() { None } else { Some(Publisher::<Signals>::open(node)?) };
         let parameters =
-            if declared.parameters.is_empty() { None } else { Some(node.publisher::<Parameters>()?) };
-        let events = node.publisher::<Event>()?;
+            if declared.parameters.is_empty() { None } else { Some(Publisher::<Parameters>::open(node)?) };
+        let events = Publisher::<Event>::open(node)?;
         commands.warm_up()?;
         states.warm_up()?;
         signals.as_ref().map_or(Ok(()), Publisher::warm_up)?;

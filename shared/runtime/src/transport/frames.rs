@@ -2,14 +2,11 @@
 //!
 //! The messages of a sample share the cost of sending and receiving it. Each message keeps a number of its own.
 
-use iceoryx2::prelude::{AllocationStrategy, ipc};
-use iceoryx2::{sample::Sample, service::port_factory::publish_subscribe::PortFactory};
+use iceoryx2::{prelude::ipc, sample::Sample};
+use masseter_domain::{BATCH, Inlet, Node, Outlet, TransportError, failed, frame_inlet, frame_outlet};
 
-use super::{Connecting, Inlet, Node, Outlet, TransportError, check_version, failed};
+use super::{Connecting, check_version};
 use crate::messages::{FrameTap, Message};
-
-/// Most messages in a sample: the messages of a cycle of six drives.
-const BATCH: usize = 16;
 
 /// Publishes frames and numbers them.
 #[derive(Debug)]
@@ -31,23 +28,15 @@ fn send(
     count: usize,
     next: &mut dyn FnMut() -> FrameTap,
 ) -> Result<(), TransportError> {
-    let sample = outlet.inner.loan_slice_uninit(count).map_err(failed("loaning", FrameTap::TOPIC))?;
+    let sample = outlet.loan_slice_uninit(count).map_err(failed("loaning", FrameTap::TOPIC))?;
     sample.write_from_fn(|_| next()).send().map_err(failed("sending", FrameTap::TOPIC))?;
     Ok(())
-}
-
-fn service(node: &Node) -> Result<PortFactory<ipc::Service, [FrameTap], ()>, TransportError> {
-    let builder = node.topic::<FrameTap, [FrameTap]>(FrameTap::DEPTH / BATCH)?;
-    builder.open_or_create().map_err(failed("opening topic", FrameTap::TOPIC))
 }
 
 impl FramePublisher {
     /// A publisher of the topic of frames.
     pub fn open(node: &Node) -> Result<Self, TransportError> {
-        let service = service(node)?;
-        let builder = service.publisher_builder().initial_max_slice_len(BATCH);
-        let builder = builder.allocation_strategy(AllocationStrategy::Static);
-        Ok(Self { port: Outlet::create(builder, FrameTap::TOPIC)?, sent: 0 })
+        Ok(Self { port: frame_outlet(node)?, sent: 0 })
     }
 
     /// The number of samples for this many frames.
@@ -81,7 +70,7 @@ impl FramePublisher {
 
     /// Touches the memory of the next batch, as the `warm_up` of a publisher of single messages.
     pub fn warm_up(&self) -> Result<(), TransportError> {
-        let sample = self.port.inner.loan_slice_uninit(BATCH).map_err(failed("loaning", FrameTap::TOPIC))?;
+        let sample = self.port.loan_slice_uninit(BATCH).map_err(failed("loaning", FrameTap::TOPIC))?;
         drop(sample.write_from_fn(|_| FrameTap::default()));
         Ok(())
     }
@@ -90,14 +79,13 @@ impl FramePublisher {
 impl FrameSubscriber {
     /// A subscriber of the topic of frames.
     pub fn open(node: &Node) -> Result<Self, TransportError> {
-        let service = service(node)?;
-        Ok(Self(Inlet::create(service.subscriber_builder(), FrameTap::TOPIC)?))
+        frame_inlet(node).map(Self)
     }
 
     /// The oldest waiting batch; never waits. Refuses after a failed connection to a publisher, because its frames are
     /// missing.
     pub fn receive(&self) -> Result<Option<Batch>, TransportError> {
-        let batch = self.0.inner.receive().map_err(failed("receiving", FrameTap::TOPIC))?;
+        let batch = self.0.receive().map_err(failed("receiving", FrameTap::TOPIC))?;
         self.0.require_all_connections()?;
         batch.iter().flat_map(|frames| frames.iter()).try_for_each(check_version)?;
         Ok(batch)

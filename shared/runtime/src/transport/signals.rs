@@ -7,8 +7,8 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::io::Errno;
 use rustix::net::{RecvFlags, recv};
 
-use super::Node;
-use super::runtime::{DomainError, file_error};
+use masseter_domain::{DomainError, Node, file_error};
+
 use crate::clock;
 
 /// Longest wait for room in the receiver's queue. The queue has more room than the processes need.

@@ -19,7 +19,7 @@ const OF_OTHERS: u32 = 0o077;
 const WRITE_OF_OTHERS: u32 = 0o022;
 /// Longest session folder, bytes. iceoryx2 aborts on paths of more than 255 bytes, and needs most of them for its own
 /// names.
-pub(super) const LONGEST_SESSION_FOLDER: usize = 40;
+pub(crate) const LONGEST_SESSION_FOLDER: usize = 40;
 /// Most folders of a user in `/dev/shm`, so that a taken name does not stop another user.
 const FOLDERS: usize = 8;
 
@@ -70,7 +70,8 @@ pub enum DomainError {
     },
 }
 
-pub(super) fn file_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> DomainError {
+/// The error of a file, for `map_err`.
+pub fn file_error(action: &'static str, path: &Path) -> impl FnOnce(io::Error) -> DomainError {
     move |error| DomainError::File { action, path: path.to_owned(), error }
 }
 
@@ -78,7 +79,7 @@ pub(super) fn file_error(action: &'static str, path: &Path) -> impl FnOnce(io::E
 ///
 /// # Errors
 /// [`DomainError::NotPrivate`] if every possible folder belongs to other users or is open to them.
-pub(super) fn folder() -> Result<PathBuf, DomainError> {
+pub(crate) fn folder() -> Result<PathBuf, DomainError> {
     folders().map(|mut folders| folders.swap_remove(0))
 }
 
@@ -86,7 +87,7 @@ pub(super) fn folder() -> Result<PathBuf, DomainError> {
 ///
 /// # Errors
 /// As [`folder`].
-pub(super) fn folders() -> Result<Vec<PathBuf>, DomainError> {
+pub(crate) fn folders() -> Result<Vec<PathBuf>, DomainError> {
     let own = format!("/dev/shm/masseter-{}", geteuid().as_raw());
     let others = (1..FOLDERS).map(|number| format!("{own}-{number}").into());
     let of_user: Vec<PathBuf> = iter::once(own.clone().into()).chain(others).collect();
@@ -167,17 +168,17 @@ fn is_own_folder_without(rights: u32, path: &Path) -> bool {
 }
 
 /// The metadata of a file of this user; none for a link, another user's file, or a missing file.
-pub(super) fn own_file(path: &Path) -> Option<Metadata> {
+pub(crate) fn own_file(path: &Path) -> Option<Metadata> {
     fs::symlink_metadata(path).ok().filter(is_own)
 }
 
 /// Whether the path is a file of this user, and no link.
-pub(super) fn is_own(found: &Metadata) -> bool {
+pub(crate) fn is_own(found: &Metadata) -> bool {
     found.is_file() && found.uid() == geteuid().as_raw()
 }
 
 /// Takes the rights of others from a file of this user; leaves other files alone.
-pub(super) fn make_private(path: &Path) -> Result<(), DomainError> {
+pub(crate) fn make_private(path: &Path) -> Result<(), DomainError> {
     match own_file(path) {
         Some(found) if found.mode() & OF_OTHERS != 0 => {
             let made = fs::set_permissions(path, PermissionsExt::from_mode(0o600));
@@ -188,7 +189,7 @@ pub(super) fn make_private(path: &Path) -> Result<(), DomainError> {
 }
 
 /// Makes a folder for its owner only, unless the name is taken.
-pub(super) fn make(path: &Path) -> io::Result<()> {
+pub(crate) fn make(path: &Path) -> io::Result<()> {
     match DirBuilder::new().mode(ONLY_OWNER.bits()).create(path) {
         Err(error) if error.kind() != ErrorKind::AlreadyExists => Err(error),
         _ => Ok(()),
@@ -196,7 +197,7 @@ pub(super) fn make(path: &Path) -> io::Result<()> {
 }
 
 /// Opens a file for its owner only, or creates the file. Follows no link and truncates nothing.
-pub(super) fn open(path: &Path) -> Result<File, DomainError> {
+pub(crate) fn open(path: &Path) -> Result<File, DomainError> {
     let mut options = OpenOptions::new();
     options.read(true).write(true).create(true).truncate(false);
     options.mode(0o600).custom_flags(libc::O_NOFOLLOW).open(path).map_err(file_error("create", path))

@@ -6,7 +6,7 @@
 //! of a field of variable length. The recording writes [`Message::body`] unchanged, with the definition that
 //! [`Message::definition`] derives from the same table.
 //!
-//! The codes of enumerations are in [`codes`]. The transport is in [`transport`](crate::transport).
+//! The codes of enumerations are in [`codes`]. The transport is in `masseter_runtime::transport`.
 
 pub mod codes;
 mod message;

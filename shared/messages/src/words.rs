@@ -247,7 +247,7 @@ const fn no_pose(reason: NoPose) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::messages::codes::NO_AXIS;
+    use crate::codes::NO_AXIS;
 
     fn event(cause: Cause) -> Event {
         Event {

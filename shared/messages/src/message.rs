@@ -134,7 +134,7 @@ macro_rules! messages {
         }
     )*};
 }
-pub(super) use messages;
+pub(crate) use messages;
 
 /// A type of a message field.
 pub(super) trait FieldType {
@@ -316,7 +316,7 @@ impl FieldType for Values {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::messages::{Command, Event, FrameTap, Reading, State};
+    use crate::{Command, Event, FrameTap, Reading, State};
 
     #[test]
     fn the_schema_lists_every_field_in_order() {

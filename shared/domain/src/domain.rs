@@ -7,21 +7,20 @@
 use std::fs::{self, File, Metadata, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::{ops::Deref, os::unix::fs::MetadataExt, time::Duration};
+use std::{ops::Deref, os::unix::fs::MetadataExt, thread, time::Duration};
 
 use rustix::fs::{major, minor};
 use rustix::io::{FdFlags, fcntl_setfd};
 use rustix::process::getuid;
 
-use super::runtime::{self, DomainError, file_error};
-use crate::clock::{self, SECOND_NS};
+use crate::folder::{self, DomainError, file_error};
 
 const SHARED_MEMORY: &str = "/dev/shm";
 const LOCK: &str = "lock";
 /// A name that is not valid for a domain.
 const TURN: &str = ".turn";
-/// Claims and sweeps take milliseconds, ns.
-const TURN_TIMEOUT_NS: u64 = 5 * SECOND_NS;
+/// Claims and sweeps take milliseconds.
+const TURN_TIMEOUT: Duration = Duration::from_secs(5);
 const TURN_POLL: Duration = Duration::from_millis(5);
 
 /// The names of one run.
@@ -91,7 +90,7 @@ impl Domain {
     /// A domain by its id, in the private folder of this user.
     pub fn named(id: &str) -> Result<Self, DomainError> {
         if is_id(id) {
-            Ok(Self { id: id.to_owned(), root: runtime::folder()?.join(id) })
+            Ok(Self { id: id.to_owned(), root: folder::folder()?.join(id) })
         } else {
             Err(DomainError::BadName(id.to_owned()))
         }
@@ -124,10 +123,10 @@ impl Domain {
         }
         self.remove_files()?;
         let path = self.root.join(LOCK);
-        runtime::make(&self.root).map_err(file_error("create", &self.root))?;
-        let mut lock = runtime::open(&path)?;
+        folder::make(&self.root).map_err(file_error("create", &self.root))?;
+        let mut lock = folder::open(&path)?;
         lock.try_lock().map_err(io::Error::from).map_err(file_error("lock", &path))?;
-        runtime::secret()
+        folder::secret()
             .and_then(|secret| lock.write_all(secret.as_bytes()))
             .map_err(file_error("write", &path))?;
         // Children inherit the lock, so the domain counts as alive until the end of the last child.
@@ -173,7 +172,7 @@ impl Domain {
     /// # Errors
     /// When shared memory cannot be listed, or the system refuses.
     pub fn make_private(&self) -> Result<(), DomainError> {
-        self.own_shared_memory()?.iter().try_for_each(|path| runtime::make_private(path))
+        self.own_shared_memory()?.iter().try_for_each(|path| folder::make_private(path))
     }
 
     /// The files of this user among [`Self::shared_memory`].
@@ -181,7 +180,7 @@ impl Domain {
     /// # Errors
     /// When shared memory cannot be listed.
     pub fn own_shared_memory(&self) -> Result<Vec<PathBuf>, DomainError> {
-        Ok(self.shared_memory()?.into_iter().filter(|path| runtime::own_file(path).is_some()).collect())
+        Ok(self.shared_memory()?.into_iter().filter(|path| folder::own_file(path).is_some()).collect())
     }
 
     /// A file of another user in shared memory with the prefix. The first own file shows the prefix to everybody.
@@ -191,7 +190,7 @@ impl Domain {
     pub fn foreign_file(&self) -> Result<Option<PathBuf>, DomainError> {
         let files = self.shared_memory()?;
         // One query for each file: iceoryx2 may remove an own file at any time, and a second query then finds no owner.
-        let is_foreign = |path: &PathBuf| path.symlink_metadata().is_ok_and(|found| !runtime::is_own(&found));
+        let is_foreign = |path: &PathBuf| path.symlink_metadata().is_ok_and(|found| !folder::is_own(&found));
         Ok(files.into_iter().find(is_foreign))
     }
 
@@ -218,7 +217,7 @@ impl Domain {
     /// Every domain of this user with files.
     pub fn all() -> Result<Vec<Self>, DomainError> {
         let mut domains = Vec::new();
-        for folder in runtime::folders()? {
+        for folder in folder::folders()? {
             let found = entries(&folder)?.into_iter().map(|root| (file_name(&root).to_owned(), root));
             domains.extend(found.filter(|(id, _)| is_id(id)).map(|(id, root)| Self { id, root }));
         }
@@ -226,7 +225,7 @@ impl Domain {
     }
 
     /// The domains with a living process and a file of this name, such as a socket, in the root folder.
-    pub(crate) fn serving(name: &str) -> Result<Vec<Self>, DomainError> {
+    pub fn serving(name: &str) -> Result<Vec<Self>, DomainError> {
         let serves = |domain: &Self| domain.root.join(name).exists() && domain.is_alive().unwrap_or(false);
         Ok(Self::all()?.into_iter().filter(serves).collect())
     }
@@ -235,13 +234,16 @@ impl Domain {
     /// like a released lock. The turn ends with the drop of the file.
     fn take_turn(&self) -> Result<File, DomainError> {
         let path = self.root.with_file_name(TURN);
-        let turn = runtime::open(&path)?;
-        let give_up_ns = clock::now_ns() + TURN_TIMEOUT_NS;
+        let turn = folder::open(&path)?;
+        let mut polls = TURN_TIMEOUT.as_millis() / TURN_POLL.as_millis();
         loop {
             match turn.try_lock() {
                 Ok(()) => return Ok(turn),
                 Err(TryLockError::Error(error)) => return Err(file_error("lock", &path)(error)),
-                Err(TryLockError::WouldBlock) if clock::now_ns() < give_up_ns => clock::sleep(TURN_POLL),
+                Err(TryLockError::WouldBlock) if polls > 0 => {
+                    polls -= 1;
+                    thread::sleep(TURN_POLL);
+                }
                 Err(TryLockError::WouldBlock) => {
                     let holder = turn.metadata().ok().and_then(|file| lock_holder(&file));
                     let holder = holder.unwrap_or_else(|| "an unknown process".to_owned());
@@ -262,8 +264,8 @@ fn check_mapped_file(line: &str, path: &str) -> Result<(), DomainError> {
     // The kernel marks removed files.
     let (path, is_removed) = path.strip_suffix(" (deleted)").map_or((path, false), |path| (path, true));
     match fs::symlink_metadata(path) {
-        Ok(found) if runtime::is_own(&found) && Some(found.ino()) == inode && !is_removed => Ok(()),
-        Ok(found) if !runtime::is_own(&found) => Err(DomainError::Foreign(path.into())),
+        Ok(found) if folder::is_own(&found) && Some(found.ino()) == inode && !is_removed => Ok(()),
+        Ok(found) if !folder::is_own(&found) => Err(DomainError::Foreign(path.into())),
         _ => Err(DomainError::Gone(path.into())),
     }
 }
