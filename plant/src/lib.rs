@@ -2,27 +2,28 @@
 //!
 //! | module | holds | depends on |
 //! | --- | --- | --- |
-//! | `master` | boot, exchange, supervision of the drives; [`wanted`] objects; link, layout of the buses | |
+//! | `master` | boot, exchange, supervision of the drives; [`wanted`] objects; [`sdo`] client; link, layout of the buses | |
 //! | `simulator::mechanism` | dynamics, axes with friction and stops, contact of teeth and food, poses at rest | |
 //! | [`emulation`] | a scenario's drives and mechanism on simulated or real wires | mechanism, `masseter-drives`, `master` |
 //! | `simulator::injection` | when faults and stimuli act, their events; faults of commands | `master` |
-//! | [`commissioning`] | a client of single drives that inspects, configures and moves them | `master`, [`emulation`] |
-//! | [`description`] | EDS and DBC of the emulated drives, DCF of any drive | [`emulation`], [`commissioning`] |
+//! | [`Wires`] | the master's ports, for the commissioning in its place | `master`, [`emulation`] |
 //! | [`core`] | master and link as one pure step function | `master`, `simulator` |
 //! | [`process`] | the core bound to iceoryx2 and to real time | [`core`] |
 //!
 //! Between master and drives there are frames on a bus and nothing else. The plant does not depend on the controller
 //! and does not solve the forward kinematics: its truth is the integrated mechanism.
 
-pub mod commissioning;
 pub mod core;
 pub mod cycle;
-pub mod description;
 mod error;
 mod master;
 pub mod process;
 mod simulator;
+mod wires;
 
 pub use error::{ContactError, DynamicsError, PlantError};
-pub use master::wanted;
+pub use master::link::{Address, addresses, sender};
+pub use master::sockets::judge_interfaces;
+pub use master::{sdo, wanted};
 pub use simulator::emulation;
+pub use wires::Wires;

@@ -2,8 +2,9 @@
 
 use std::fmt::{self, Display, Formatter};
 
+use masseter_commissioning::Known;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::{commissioning::Known, wanted::rpdo_timeout_ms};
+use masseter_plant::wanted::rpdo_timeout_ms;
 use masseter_scenario::Scenario;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -91,7 +92,7 @@ impl Display for Difference {
 
 #[cfg(test)]
 mod tests {
-    use masseter_plant::commissioning::NOT_ASKED;
+    use masseter_commissioning::NOT_ASKED;
 
     use super::*;
 

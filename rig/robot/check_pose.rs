@@ -1,11 +1,11 @@
 //! `masseter robot check-pose`: whether the six positions give the closed pose.
 
 use anyhow::{Context, anyhow, bail, ensure};
+use masseter_commissioning::{MotionError, Stand, stand};
 use masseter_controller::trajectory::{closed_jaw_points, closed_pose};
 use masseter_model::geometry::{
     AXES, AXIS_NAMES, Actuators, Conditioning, Jacobian, Joints, Mechanism, Pose, Vec3,
 };
-use masseter_plant::commissioning::{MotionError, Stand, stand};
 use masseter_runtime::{clock::MILLISECOND_NS, messages::pose_fields};
 use masseter_scenario::Scenario;
 use masseter_terminal::{Exit, Failure, OrFailure, result_line};

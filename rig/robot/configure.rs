@@ -7,11 +7,11 @@
 use std::fmt::Write;
 
 use anyhow::{Context, anyhow, ensure};
-use masseter_model::geometry::AXIS_NAMES;
-use masseter_plant::commissioning::{
+use masseter_commissioning::{
     BootUps, Change, Deviation, Identity, Known, NOT_ASKED, Outcome, Settings, Survey, Writer, check_present,
     check_undisturbed, reset, store,
 };
+use masseter_model::geometry::AXIS_NAMES;
 use masseter_scenario::{Scenario, wording::counted};
 use masseter_terminal::{Exit, Failure, OrFailure, Tone, result, result_with_tones, status};
 use serde::{Deserialize, Serialize};

@@ -8,8 +8,8 @@ use std::io::{self, BufRead, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::{fs::File, time::UNIX_EPOCH};
 
+use masseter_commissioning::{Identity, Known, NOT_ASKED};
 use masseter_model::geometry::AXIS_NAMES;
-use masseter_plant::commissioning::{Identity, Known, NOT_ASKED};
 use masseter_recording::RunFolder;
 use masseter_runtime::clock;
 use masseter_scenario::{Scenario, input::open_regular};
@@ -335,8 +335,8 @@ impl Past {
 mod tests {
     use std::fs;
 
+    use masseter_commissioning::Entry;
     use masseter_model::geometry::AXES;
-    use masseter_plant::commissioning::Entry;
 
     use super::*;
 

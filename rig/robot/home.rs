@@ -1,7 +1,7 @@
 //! `masseter robot home`: one axis after the other.
 
+use masseter_commissioning::{HomeReport, Wish, home as find};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::commissioning::{HomeReport, Wish, home as find};
 use masseter_terminal::{Exit, Failure, OrFailure, result_line};
 
 use super::power_mark::{Homed, leave_mark};

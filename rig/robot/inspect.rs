@@ -6,12 +6,12 @@
 use std::{collections::BTreeMap, fmt::Write};
 
 use masseter_can::{JudgedInterface, canopen::ObjectAddress};
-use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::commissioning::{
-    Address, BootUps, Deviation, Identity, LineError, OtherMaster, Outcome, Restarted, Survey, gaps,
-    judge_interfaces, object_name, reason_text,
+use masseter_commissioning::{
+    BootUps, Deviation, Identity, LineError, OtherMaster, Outcome, Restarted, Survey, description, gaps,
+    object_name, reason_text,
 };
-use masseter_plant::description;
+use masseter_model::geometry::{AXES, AXIS_NAMES};
+use masseter_plant::{Address, judge_interfaces};
 use masseter_scenario::{DriveProfile, wording::counted};
 use masseter_terminal::{Exit, Failure, OrFailure, Tone, result_with_tones};
 use serde::Serialize;

@@ -5,8 +5,8 @@ use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::{io::Read, thread, time::Duration};
 
 use anyhow::anyhow;
+use masseter_commissioning::{JogOrder, JogReport, SyncAnswers, Wish, jog as play};
 use masseter_model::geometry::AXIS_NAMES;
-use masseter_plant::commissioning::{JogOrder, JogReport, SyncAnswers, Wish, jog as play};
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_terminal::{Exit, Failure, OrFailure, result_line, status};
 

@@ -8,10 +8,10 @@ use std::io;
 use std::path::{Path, PathBuf};
 
 use anyhow::{anyhow, ensure};
-use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::commissioning::{
+use masseter_commissioning::{
     Identity, Ledger, Line, LineError, OldValue, Settings, give_back, object_name, value_text,
 };
+use masseter_model::geometry::{AXES, AXIS_NAMES};
 use masseter_recording::write_whole;
 use masseter_scenario::input::{MOST_KEPT_BYTES, read_text};
 use masseter_scenario::{CanConfig, ObjectKey, Scenario};

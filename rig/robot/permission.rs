@@ -5,7 +5,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail, ensure};
-use masseter_plant::commissioning::{Identity, Known, Line, NOT_ASKED};
+use masseter_commissioning::{Identity, Known, Line, NOT_ASKED};
 use masseter_scenario::{FileConfig, Scenario, input::read_bytes};
 use serde::{Deserialize, Serialize};
 use sha1::{Digest, Sha1};

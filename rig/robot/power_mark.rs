@@ -5,8 +5,8 @@
 
 use anyhow::Context;
 use masseter_can::canopen::ObjectAddress;
+use masseter_commissioning::{Line, LineError};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::commissioning::{Line, LineError};
 use masseter_runtime::clock;
 use masseter_scenario::{DriveProfile, ObjectConfig, ObjectKey, ObjectRule, Scenario};
 use masseter_terminal::{Failure, status};
@@ -172,7 +172,7 @@ pub(super) fn check_mark(
 mod tests {
     use std::{io, path::Path};
 
-    use masseter_plant::commissioning::{JogOrder, Wish, jog, reset};
+    use masseter_commissioning::{JogOrder, Wish, jog, reset};
     use serde_json::{Value, json};
 
     use super::super::evidence::StepFolder;

@@ -2,12 +2,12 @@
 
 use std::io::Write;
 
-use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::commissioning::{
-    BootUps, Deviation, Known, Line, Outcome, PowerError, Settings, Survey, deviations, gaps,
-    judge_interfaces, prove_no_power, take_over,
+use masseter_commissioning::{
+    BootUps, Deviation, Known, Line, Outcome, PowerError, Settings, Survey, deviations, gaps, prove_no_power,
+    take_over,
 };
-use masseter_plant::wanted::WantedDrive;
+use masseter_model::geometry::{AXES, AXIS_NAMES};
+use masseter_plant::{judge_interfaces, wanted::WantedDrive};
 use masseter_scenario::{CanConfig, Scenario};
 use masseter_terminal::{Exit, Failure, status};
 

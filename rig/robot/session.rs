@@ -1,11 +1,11 @@
 //! A step that moves or reads the drives, from the claimed interfaces to its evidence and exit code.
 
 use anyhow::Context;
-use masseter_model::geometry::AXES;
-use masseter_plant::commissioning::{
+use masseter_commissioning::{
     AxisError, BootUps, Disturbance, Identity, Known, Line, LineError, MotionError, NOT_ASKED, StopCause,
     check_present, check_undisturbed,
 };
+use masseter_model::geometry::AXES;
 use masseter_runtime::lifecycle::StopRequest;
 use masseter_terminal::{Exit, Failure, OrFailure, status};
 use serde::Serialize;

@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
+use masseter_commissioning::{Identity, Known};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::commissioning::{Identity, Known};
 use masseter_terminal::{Exit, Tone, result, result_with_tones};
 
 use super::{args::RobotArgs, basis::Basis, evidence::Past, step::Step};

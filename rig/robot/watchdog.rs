@@ -1,7 +1,7 @@
 //! `masseter robot watchdog`: one axis after the other stands with power, and must stop once the master sends nothing.
 
+use masseter_commissioning::{LastFrame, Reaction, WatchdogReport, Wish, prove_watchdogs};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
-use masseter_plant::commissioning::{LastFrame, Reaction, WatchdogReport, Wish, prove_watchdogs};
 use masseter_terminal::{Exit, Failure, OrFailure, result_line};
 
 use super::{args::AxesArgs, session::Session, step::Step};

@@ -7,7 +7,7 @@ use super::workspace::{crate_roots, list, metadata, text, within};
 
 /// The crates of the workspace that each crate may use, all by their folders. The root package may use all
 /// but the programs that a run does not need.
-const MAY_USE: [(&str, &[&str]); 31] = [
+const MAY_USE: [(&str, &[&str]); 32] = [
     ("shared/can", &[]),
     ("shared/model", &[]),
     ("shared/scenario", &["shared/can", "shared/model"]),
@@ -49,6 +49,10 @@ const MAY_USE: [(&str, &[&str]); 31] = [
     ),
     ("plant/drives", &["shared/can"]),
     ("plant", &["shared/can", "shared/model", "shared/scenario", "shared/runtime", "plant/drives"]),
+    (
+        "plant/commissioning",
+        &["shared/can", "shared/model", "shared/scenario", "shared/runtime", "plant/drives", "plant"],
+    ),
     ("rig/show/terminal", &[]),
     ("rig/show/charts", &[]),
     ("rig/show/page", &[]),

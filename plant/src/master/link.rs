@@ -120,7 +120,7 @@ pub struct Address {
 }
 
 /// The node that sends an object; none for an object that only a master sends.
-pub(crate) const fn sender(cob: Cob) -> Option<NodeId> {
+pub const fn sender(cob: Cob) -> Option<NodeId> {
     match cob {
         Cob::Heartbeat(node) | Cob::Tpdo1(node) | Cob::Emergency(node) | Cob::SdoResponse(node) => Some(node),
         Cob::Nmt | Cob::Sync | Cob::Rpdo1(_) | Cob::SdoRequest(_) => None,
@@ -128,7 +128,10 @@ pub(crate) const fn sender(cob: Cob) -> Option<NodeId> {
 }
 
 /// The address of each axis' drive.
-pub(crate) fn addresses(can: &CanConfig) -> Result<[Address; AXES], PlantError> {
+///
+/// # Errors
+/// [`PlantError`] for buses and node ids that cannot be used.
+pub fn addresses(can: &CanConfig) -> Result<[Address; AXES], PlantError> {
     let (ports, ids) = (drive_ports(can)?, node_ids(can)?);
     Ok(std::array::from_fn(|axis| Address { bus: ports[axis].bus, node: ids[axis] }))
 }

@@ -19,7 +19,7 @@ mod following;
 mod gate;
 pub(crate) mod link;
 mod presence;
-pub(crate) mod sdo;
+pub mod sdo;
 pub(crate) mod sockets;
 mod supervision;
 pub mod wanted;

@@ -27,9 +27,11 @@ pub enum SdoReason {
 
 /// A transfer that fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub(crate) struct SdoFailure {
-    pub(crate) object: ObjectAddress,
-    pub(crate) reason: SdoReason,
+pub struct SdoFailure {
+    /// The object.
+    pub object: ObjectAddress,
+    /// The reason.
+    pub reason: SdoReason,
 }
 
 /// The next action of a transfer.
@@ -51,14 +53,14 @@ struct Transfer {
 
 /// The client's memory: at most one transfer, and an abort to be sent.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
-pub(crate) struct SdoClient {
+pub struct SdoClient {
     transfer: Option<Transfer>,
     abort: Option<(ObjectAddress, AbortCode)>,
 }
 
 impl SdoClient {
     /// Begins a read or a write of an object; forgets the present transfer.
-    pub(crate) fn begin(&mut self, object: ObjectAddress, written: Option<Expedited>) {
+    pub fn begin(&mut self, object: ObjectAddress, written: Option<Expedited>) {
         let action = written.map_or(Action::Read, Action::Write);
         self.transfer = Some(Transfer { object, action, sent_ns: None, attempt: 1 });
     }
@@ -73,8 +75,12 @@ impl SdoClient {
         self.transfer.is_some_and(|transfer| transfer.attempt > 1)
     }
 
-    /// Begins a transfer anew after a silence of more than `timeout_ns`. Gives the transfer up after [`ATTEMPTS`].
-    pub(crate) fn expire(&mut self, now_ns: u64, timeout_ns: u64) -> Result<(), SdoFailure> {
+    /// Begins a transfer anew after a silence of more than `timeout_ns`. Gives the transfer up after the
+    /// last attempt.
+    ///
+    /// # Errors
+    /// [`SdoFailure`] of the transfer that is given up.
+    pub fn expire(&mut self, now_ns: u64, timeout_ns: u64) -> Result<(), SdoFailure> {
         let Some(transfer) = &mut self.transfer else { return Ok(()) };
         if transfer.sent_ns.is_none_or(|sent_ns| now_ns.saturating_sub(sent_ns) <= timeout_ns) {
             return Ok(());
@@ -91,7 +97,7 @@ impl SdoClient {
     }
 
     /// The request that is due, if any.
-    pub(crate) fn poll(&mut self, now_ns: u64) -> Option<SdoRequest> {
+    pub fn poll(&mut self, now_ns: u64) -> Option<SdoRequest> {
         if let Some((object, code)) = self.abort.take() {
             return Some(SdoRequest::Abort { object, code });
         }
@@ -109,7 +115,7 @@ impl SdoClient {
     /// for an answer without a request. Such answers follow a transfer begun twice or a repeated frame, or come from a
     /// second server with the same node id. The segments of a longer value go to `long`, and the value is then none;
     /// without `long` the client aborts.
-    pub(crate) fn take_answer(
+    pub fn take_answer(
         &mut self,
         response: SdoResponse,
         mut long: Option<&mut Vec<u8>>,
@@ -163,6 +169,6 @@ impl SdoClient {
 }
 
 /// A value of at most four bytes as an unsigned little-endian number.
-pub(crate) fn number(bytes: &[u8]) -> u32 {
+pub fn number(bytes: &[u8]) -> u32 {
     bytes.iter().rfold(0, |number, &byte| number << 8 | u32::from(byte))
 }

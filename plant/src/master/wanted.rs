@@ -77,13 +77,13 @@ pub struct Setting {
 
 impl Setting {
     /// Whether a value has the same lowest bytes.
-    pub(crate) fn is_shown_by(&self, found: u32) -> bool {
+    pub fn is_shown_by(&self, found: u32) -> bool {
         (self.value ^ found) & value_bits(self.bytes) == 0
     }
 }
 
 /// The bits of a value of that many bytes.
-pub(crate) const fn value_bits(bytes: usize) -> u32 {
+pub const fn value_bits(bytes: usize) -> u32 {
     u32::MAX >> (32 - 8 * bytes)
 }
 
@@ -133,12 +133,12 @@ impl PdoSetting {
     }
 
     /// Whether an object is one of its timers, which not every drive has.
-    pub(crate) fn is_timer(&self, object: ObjectAddress) -> bool {
+    pub fn is_timer(&self, object: ObjectAddress) -> bool {
         object.index == self.communication && object.subindex > 2
     }
 
     /// Whether a COB-ID is right: the number counts for a PDO that exists.
-    pub(crate) fn has_cob_id(&self, found: u32) -> bool {
+    pub fn has_cob_id(&self, found: u32) -> bool {
         if CobId(self.cob_id).is_valid() {
             (self.cob_id ^ found) & COB_ID_BITS == 0
         } else {
@@ -147,7 +147,7 @@ impl PdoSetting {
     }
 
     /// The parts but the COB-ID with their values.
-    pub(crate) fn parts(&self) -> Vec<(ObjectAddress, u32)> {
+    pub fn parts(&self) -> Vec<(ObjectAddress, u32)> {
         let Some(PdoLayout { transmission, inhibit, event, mapping }) = &self.layout else {
             return Vec::new();
         };
@@ -162,7 +162,7 @@ impl PdoSetting {
     }
 
     /// The master's comparisons, in this order: COB-ID, transmission type and mapping of a PDO that must exist.
-    pub(crate) fn compared(&self) -> impl Iterator<Item = WantedIdentity> {
+    pub fn compared(&self) -> impl Iterator<Item = WantedIdentity> {
         let cob_id = WantedIdentity { object: self.part(1), mask: COB_ID_BITS, value: self.cob_id };
         let parts = self.parts().into_iter().filter(move |(object, _)| !self.is_timer(*object));
         let parts = parts.map(|(object, value)| WantedIdentity { object, mask: u32::MAX, value });
@@ -172,7 +172,7 @@ impl PdoSetting {
 
 /// Whether the acknowledgement alone proves the write of an object that a drive refuses to show with this code. There
 /// is no other proof for a write-only object.
-pub(crate) fn is_write_only(code: AbortCode) -> bool {
+pub fn is_write_only(code: AbortCode) -> bool {
     code == AbortCode::WRITE_ONLY
 }
 
@@ -185,7 +185,7 @@ const SHOWN_ELSEWHERE: [(u16, &str); 4] = [
 ];
 
 /// The bits of an object that must equal the written bits; none for another proof of the write.
-pub(crate) fn shown_bits(object: ObjectAddress, value: u32, bytes: usize) -> Option<u32> {
+pub fn shown_bits(object: ObjectAddress, value: u32, bytes: usize) -> Option<u32> {
     let is_cob_id = matches!(object.index, 0x1400..0x1600 | 0x1800..0x1A00) && object.subindex == 1;
     match SHOWN_ELSEWHERE.iter().find(|(index, _)| *index == object.index) {
         Some(_) => None,
@@ -198,13 +198,13 @@ pub(crate) fn shown_bits(object: ObjectAddress, value: u32, bytes: usize) -> Opt
 }
 
 /// Offsets of position, velocity and torque, with the bytes of each. A drive keeps the last value of its process data.
-pub(crate) const OFFSETS: [(u16, usize); 3] = [(0x60B0, 4), (0x60B1, 4), TORQUE_OFFSET];
+pub const OFFSETS: [(u16, usize); 3] = [(0x60B0, 4), (0x60B1, 4), TORQUE_OFFSET];
 /// The only offset that process data of the rig may carry.
 const TORQUE_OFFSET: (u16, usize) = (0x60B2, 2);
 
 /// Whether a drive with an object may keep another value. An offset moves or loads the axis: a drive may lack the
 /// object, but not keep another value.
-pub(crate) fn may_keep(rule: ObjectRule, object: ObjectAddress) -> bool {
+pub fn may_keep(rule: ObjectRule, object: ObjectAddress) -> bool {
     rule == ObjectRule::Optional && OFFSETS.iter().all(|(index, _)| *index != object.index)
 }
 
@@ -388,7 +388,7 @@ pub fn rpdo_timeout_ms(scenario: &Scenario) -> u16 {
 }
 
 /// COB-ID without the bit for remote requests, which the master does not send.
-pub(crate) const COB_ID_BITS: u32 = !CobId::NO_REMOTE_REQUEST;
+pub const COB_ID_BITS: u32 = !CobId::NO_REMOTE_REQUEST;
 /// Communication parameters of the other PDOs with identifiers of CiA 301. Many drives send them as delivered, but the
 /// plan of the bus does not include them.
 const OTHER_PDOS: [u16; 6] = [0x1401, 0x1402, 0x1403, 0x1801, 0x1802, 0x1803];

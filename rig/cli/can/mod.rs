@@ -4,9 +4,10 @@ mod serve;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use masseter_can::{BusPlan, PlannedMessage};
+use masseter_commissioning::description;
 use masseter_model::geometry::AXIS_NAMES;
 use masseter_plan::{read_scenario, read_scenario_with};
-use masseter_plant::{core as plant, description};
+use masseter_plant::core as plant;
 use masseter_runtime::schedule::queued::{QueuedPlan, master_queue, queued_plans};
 use masseter_runtime::schedule::{CycleSchedule, Room, ScheduleError, plans};
 use serde_json::{Value, json};

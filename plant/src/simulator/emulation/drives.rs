@@ -25,7 +25,7 @@ use crate::master::link::{check_quantities, node_ids};
 ///
 /// # Errors
 /// [`PlantError`] for quantities that contradict each other and for node ids that cannot be used.
-pub(crate) fn drive_settings(scenario: &Scenario) -> Result<[DriveSettings; AXES], PlantError> {
+pub fn drive_settings(scenario: &Scenario) -> Result<[DriveSettings; AXES], PlantError> {
     check_quantities(scenario)?;
     let mut ids = node_ids(&scenario.can)?;
     for quirk in scenario.drives.quirk.iter().filter(|quirk| quirk.kind == Kind::SwappedIds) {

@@ -5,7 +5,7 @@
 //! scenario's declarations into plain values, and the active entries of its agenda into effects.
 
 mod agenda;
-pub(crate) mod drives;
+mod drives;
 mod emulator;
 mod encoder;
 pub(crate) mod jaw;
@@ -31,10 +31,11 @@ use crate::error::{DynamicsError, PlantError};
 use crate::simulator::mechanism::contact::food::{Food, FoodBreak};
 use crate::simulator::mechanism::dynamics::{Dynamics, MechanismState, level};
 use agenda::{Agenda, Effect};
-use drives::{MemoryFile, drive_settings};
+use drives::MemoryFile;
 use encoder::Encoder;
 use load_cell::LoadCell;
 
+pub use drives::drive_settings;
 pub use emulator::{Emulator, EmulatorCounters};
 pub use virtual_link::{NodePort, OpenLink, VirtualLink};
 

@@ -10,19 +10,19 @@ use masseter_can::canopen::{
 use masseter_can::cia402::{Controlword, DriveState};
 use masseter_can::{Frame, Rpdo1};
 use masseter_model::geometry::AXES;
+use masseter_plant::sdo::SdoReason;
+use masseter_plant::wanted::{PdoSetting, WantedDrive, WantedIdentity, rpdo_timeout_ms};
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_scenario::Scenario;
 use serde::{Deserialize, Serialize};
 
-use super::motion_error::{AxisError, MotionError, Silence, StopCause};
-use super::mover::{Mover, Operator, POSITIONING, Wish};
-use super::watch::{
+use crate::motion_error::{AxisError, MotionError, Silence, StopCause};
+use crate::mover::{Mover, Operator, POSITIONING, Wish};
+use crate::watch::{
     Caution, TRANSITION_NS, disable_voltage, read_error_code, read_state, stop_drive, wait_for_state,
     watch_unpowered,
 };
-use super::{line::Line, line_error::LineError, loan::Loan, steps::START_NS};
-use crate::master::sdo::SdoReason;
-use crate::master::wanted::{PdoSetting, WantedDrive, WantedIdentity, rpdo_timeout_ms};
+use crate::{line::Line, line_error::LineError, loan::Loan, steps::START_NS};
 
 /// How much longer than its time a drive may take: some drives look every few milliseconds, and the statusword comes by SDO.
 const MARGIN_NS: u64 = 50 * MILLISECOND_NS;

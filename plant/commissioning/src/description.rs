@@ -11,11 +11,11 @@ use masseter_can::CanId;
 use masseter_can::canopen::{Cob, CobId, NmtCommand, NmtState, NodeId, ObjectAddress};
 use masseter_drives::{DriveSettings, Entry, Objects, PDOS, Ratings, object_lists};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
+use masseter_plant::{PlantError, emulation::drive_settings};
 use masseter_runtime::clock::MILLISECOND_NS;
 use masseter_scenario::{MASTER_NODE, Scenario};
 
-use crate::commissioning::{Survey, object_name};
-use crate::{error::PlantError, simulator::emulation::drives::drive_settings};
+use crate::{object_words::object_name, settings::Survey};
 
 /// The electronic data sheets of the drives, in the order of the axes.
 ///
@@ -23,7 +23,7 @@ use crate::{error::PlantError, simulator::emulation::drives::drive_settings};
 /// [`PlantError`] for drives that cannot be built.
 ///
 /// ```
-/// let [d1, ..] = masseter_plant::description::eds(&masseter_scenario::Scenario::default())?;
+/// let [d1, ..] = masseter_commissioning::description::eds(&masseter_scenario::Scenario::default())?;
 /// assert!(d1.contains("ParameterName=Controlword"));
 /// # Ok::<_, masseter_plant::PlantError>(())
 /// ```
@@ -38,7 +38,7 @@ pub fn eds(scenario: &Scenario) -> Result<[String; AXES], PlantError> {
 /// [`PlantError`] for drives that cannot be built.
 ///
 /// ```
-/// let dbc = masseter_plant::description::dbc(&masseter_scenario::Scenario::default())?;
+/// let dbc = masseter_commissioning::description::dbc(&masseter_scenario::Scenario::default())?;
 /// assert!(dbc.contains("BO_ 385 d1_TPDO1: 8 d1"));
 /// # Ok::<_, masseter_plant::PlantError>(())
 /// ```

@@ -1,11 +1,11 @@
-//! One deviation of a drive from scenario and profile. [`deviations`](super::deviations) finds them.
+//! One deviation of a drive from scenario and profile. [`deviations`](crate::deviations) finds them.
 
 use std::fmt::Display;
 
 use masseter_can::canopen::ObjectAddress;
 use serde::{Serialize, Serializer};
 
-use super::object_words::object_name;
+use crate::object_words::object_name;
 
 /// The consequence of a deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -41,7 +41,7 @@ pub struct Deviation {
 
 impl Deviation {
     /// The wanted and the found value of an object, in words.
-    pub(super) fn new(
+    pub(crate) fn new(
         object: ObjectAddress,
         wanted: impl Into<String>,
         found: impl Into<String>,
@@ -55,6 +55,6 @@ impl Deviation {
 }
 
 /// Serialises a value in its printed form, such as `6066h:00h`.
-pub(super) fn as_text<S: Serializer>(value: &impl Display, serializer: S) -> Result<S::Ok, S::Error> {
+pub(crate) fn as_text<S: Serializer>(value: &impl Display, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_str(value)
 }

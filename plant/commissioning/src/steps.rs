@@ -3,13 +3,13 @@
 use masseter_can::canopen::{NmtCommand, ObjectAddress};
 use masseter_can::cia402::{Controlword, DriveState};
 use masseter_model::geometry::{AXES, AXIS_NAMES};
+use masseter_plant::sdo::SdoReason;
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_scenario::{Scenario, StoreConfig};
 use serde::Serialize;
 
-use super::watch::{read_position, read_state, read_status};
-use super::{line::Line, line_error::LineError, motion_error::MotionError};
-use crate::master::sdo::SdoReason;
+use crate::watch::{read_position, read_state, read_status};
+use crate::{line::Line, line_error::LineError, motion_error::MotionError};
 
 /// Time of the watch over an axis, ns.
 const WATCH_NS: u64 = 200 * MILLISECOND_NS;
@@ -96,7 +96,7 @@ pub struct Stand {
 /// Reads all axes twice. Nothing is written.
 ///
 /// # Errors
-/// [`MotionError::Line`] and [`AxisError::Statusword`](super::motion_error::AxisError::Statusword).
+/// [`MotionError::Line`] and [`AxisError::Statusword`](crate::motion_error::AxisError::Statusword).
 pub fn stand(line: &mut Line, scenario: &Scenario, between_ns: u64) -> Result<Stand, MotionError> {
     let mut stand = Stand {
         positions_m: [0.0; AXES],
@@ -198,7 +198,7 @@ fn unless_silent<T>(answer: Result<T, LineError>) -> Result<Option<T>, LineError
 /// Number of SYNCs for the measurement.
 const SYNCS: usize = 50;
 /// Time that a node takes to become operational, ns.
-pub(super) const START_NS: u64 = 50 * MILLISECOND_NS;
+pub(crate) const START_NS: u64 = 50 * MILLISECOND_NS;
 
 /// How a drive answered to SYNC.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
@@ -215,7 +215,7 @@ pub struct SyncAnswers {
 ///
 /// # Errors
 /// [`LineError`] except those of transfers.
-pub(super) fn sync_answers(line: &mut Line, axis: usize) -> Result<SyncAnswers, LineError> {
+pub(crate) fn sync_answers(line: &mut Line, axis: usize) -> Result<SyncAnswers, LineError> {
     line.command(axis, NmtCommand::Start)?;
     line.listen(START_NS)?;
     let answers_ns = (0..SYNCS).map(|_| line.sync_answer_ns(axis)).collect::<Result<Vec<_>, _>>();
@@ -279,7 +279,7 @@ mod sync_answer_tests {
     use masseter_scenario::Scenario;
 
     use super::*;
-    use crate::commissioning::tests::Log;
+    use crate::tests::Log;
 
     #[test]
     fn a_drive_answers_every_sync_and_gets_no_controlword() {

@@ -6,16 +6,13 @@ use std::{collections::BTreeSet, io::Write};
 
 use masseter_can::canopen::{Cob, Emergency, Heartbeat, NmtState, SdoResponse};
 use masseter_can::wire::{Bitrate, INTERFRAME_BITS, frame_bits};
-use masseter_can::{Bus, FULL_QUEUE, Frame, ReceiveError, Received, SendError, Tapped, TappedFrame, candump};
+use masseter_can::{FULL_QUEUE, Frame, ReceiveError, SendError, Tapped, TappedFrame, candump};
 use masseter_model::geometry::AXES;
-use masseter_runtime::clock::{self, MILLISECOND_NS};
+use masseter_plant::{Address, PlantError, Wires, addresses, sender};
+use masseter_runtime::clock::MILLISECOND_NS;
 use masseter_scenario::{MASTER_NODE, Scenario};
 
-use super::line_error::{LineError, MasterSign, OtherMaster};
-use crate::master::link::{Address, Buses, Link, addresses, sender};
-use crate::{
-    error::PlantError, master::sockets::SocketLink, simulator::emulation::virtual_link::VirtualLink,
-};
+use crate::line_error::{LineError, MasterSign, OtherMaster};
 
 /// Time between two looks at the buses, ns.
 const STEP_NS: u64 = MILLISECOND_NS;
@@ -28,19 +25,19 @@ struct Beat {
 }
 
 /// The buses, with the received messages.
-pub(super) struct Traffic {
-    pub(super) wires: Wires,
+pub(crate) struct Traffic {
+    pub(crate) wires: Wires,
     /// Names of the buses in the log.
-    pub(super) names: Vec<String>,
-    pub(super) addresses: [Address; AXES],
-    pub(super) heard: [Heard; AXES],
+    pub(crate) names: Vec<String>,
+    pub(crate) addresses: [Address; AXES],
+    pub(crate) heard: [Heard; AXES],
     /// The signs of other masters and nodes.
-    pub(super) strangers: Strangers,
+    pub(crate) strangers: Strangers,
     beat: Option<Beat>,
     /// Time of the last SYNC on its bus, ns.
-    pub(super) sync_ns: Option<u64>,
+    pub(crate) sync_ns: Option<u64>,
     bitrate: Bitrate,
-    pub(super) log: Box<dyn Write + Send>,
+    pub(crate) log: Box<dyn Write + Send>,
 }
 
 impl Traffic {
@@ -48,7 +45,7 @@ impl Traffic {
     ///
     /// # Errors
     /// [`PlantError`] for interfaces that cannot be opened and for buses that cannot be built.
-    pub(super) fn open(scenario: &Scenario, log: Box<dyn Write + Send>) -> Result<Self, PlantError> {
+    pub(crate) fn open(scenario: &Scenario, log: Box<dyn Write + Send>) -> Result<Self, PlantError> {
         let can = &scenario.can;
         let addresses = addresses(can)?;
         let simulated = (0..can.buses.len()).map(|bus| format!("can{bus}")).collect();
@@ -66,19 +63,19 @@ impl Traffic {
     }
 
     /// Sends the master's heartbeat from now on, with that interval.
-    pub(super) fn beat_every(&mut self, interval_ms: u16) {
+    pub(crate) fn beat_every(&mut self, interval_ms: u16) {
         self.beat =
             Some(Beat { every_ns: u64::from(interval_ms) * MILLISECOND_NS, next_ns: self.wires.now_ns() });
     }
 
     /// Sends no further heartbeat; returns when the last one was queued, ns.
-    pub(super) fn end_heartbeat(&mut self) -> u64 {
+    pub(crate) fn end_heartbeat(&mut self) -> u64 {
         let now_ns = self.wires.now_ns();
         self.beat.take().map_or(now_ns, |beat| beat.next_ns.saturating_sub(beat.every_ns))
     }
 
     /// Sends a frame to a bus.
-    pub(super) fn send(&mut self, bus: usize, frame: Frame) -> Result<(), LineError> {
+    pub(crate) fn send(&mut self, bus: usize, frame: Frame) -> Result<(), LineError> {
         self.wires.send(bus, frame).map_err(|error| match error {
             SendError::Os { errno } => self.failed(bus, errno),
             SendError::QueueFull { .. } if matches!(self.wires, Wires::Real(_)) => {
@@ -93,7 +90,7 @@ impl Traffic {
     }
 
     /// A step of time: the heartbeat, and every frame that has come.
-    pub(super) fn step(&mut self) -> Result<(), LineError> {
+    pub(crate) fn step(&mut self) -> Result<(), LineError> {
         self.wires.pass(STEP_NS)?;
         self.send_heartbeat()?;
         for bus in 0..self.names.len() {
@@ -171,17 +168,17 @@ pub struct Heard {
     /// Its emergencies, the oldest first.
     pub emergencies: Vec<Emergency>,
     /// Start of its last process data, ns.
-    pub(super) process_data_ns: Option<u64>,
+    pub(crate) process_data_ns: Option<u64>,
     /// Ends of the master's last heartbeat on its bus, and of the last process data for it, ns.
-    pub(super) beat_left_ns: Option<u64>,
-    pub(super) rpdo_left_ns: Option<u64>,
+    pub(crate) beat_left_ns: Option<u64>,
+    pub(crate) rpdo_left_ns: Option<u64>,
     /// Answers of its SDO server since the last transfer.
-    pub(super) answers: Vec<SdoResponse>,
+    pub(crate) answers: Vec<SdoResponse>,
 }
 
 impl Heard {
     /// Takes a frame of the drive. Malformed frames have no effect; the log has them.
-    pub(super) fn note_frame(&mut self, cob: Cob, frame: &Frame) {
+    pub(crate) fn note_frame(&mut self, cob: Cob, frame: &Frame) {
         match cob {
             Cob::Heartbeat(_) => {
                 if let Ok(Heartbeat { state }) = Heartbeat::decode(frame.data()) {
@@ -215,7 +212,7 @@ impl Strangers {
     }
 
     /// Takes a frame of a node that is no drive of the scenario.
-    pub(super) fn note_sender(&mut self, bus: usize, cob: Cob) {
+    pub(crate) fn note_sender(&mut self, bus: usize, cob: Cob) {
         let sign = match cob {
             Cob::Sync => MasterSign::Sync,
             Cob::Nmt => MasterSign::Nmt,
@@ -228,73 +225,5 @@ impl Strangers {
             }
         };
         self.masters.insert(OtherMaster { bus, sign });
-    }
-}
-
-/// The buses with their time.
-#[derive(Debug)]
-pub(super) enum Wires {
-    /// Simulated, up to a time, ns.
-    Simulated(Box<VirtualLink>, u64),
-    Real(SocketLink),
-}
-
-/// The same call on either kind of buses.
-macro_rules! on_link {
-    ($wires:expr, $link:ident => $call:expr) => {
-        match $wires {
-            Wires::Simulated($link, _) => $call,
-            Wires::Real($link) => $call,
-        }
-    };
-}
-
-impl Wires {
-    /// The scenario's interfaces, or simulated buses where it names none.
-    pub(super) fn open(scenario: &Scenario) -> Result<Self, PlantError> {
-        Ok(if scenario.can.is_virtual() {
-            Self::Simulated(Box::new(VirtualLink::new(scenario, 0, 0)?), 0)
-        } else {
-            Self::Real(SocketLink::open(scenario, clock::now_ns())?)
-        })
-    }
-
-    pub(super) fn now_ns(&self) -> u64 {
-        match self {
-            Self::Simulated(_, now_ns) => *now_ns,
-            Self::Real(_) => clock::now_ns(),
-        }
-    }
-
-    /// Lets time pass. Writes values that emulated drives store meanwhile to the file of their memory.
-    pub(super) fn pass(&mut self, for_ns: u64) -> Result<(), PlantError> {
-        match self {
-            Self::Simulated(link, now_ns) => {
-                *now_ns += for_ns;
-                link.advance(*now_ns)?;
-                link.emulation.save_memory()
-            }
-            Self::Real(_) => {
-                clock::sleep_until(clock::now_ns() + for_ns);
-                Ok(())
-            }
-        }
-    }
-
-    pub(super) fn send(&mut self, bus: usize, frame: Frame) -> Result<(), SendError> {
-        let now_ns = self.now_ns();
-        on_link!(self, link => link.port(bus).send(now_ns, frame))
-    }
-
-    /// The next frame of another node.
-    pub(super) fn receive(&mut self, bus: usize) -> Result<Option<Received>, ReceiveError> {
-        let now_ns = self.now_ns();
-        on_link!(self, link => link.port(bus).receive(now_ns))
-    }
-
-    /// The next frame of any node, this one too.
-    pub(super) fn tap(&mut self, bus: usize) -> Option<Tapped> {
-        let now_ns = self.now_ns();
-        on_link!(self, link => link.tap(bus, now_ns)).ok().flatten()
     }
 }

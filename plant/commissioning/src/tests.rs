@@ -262,7 +262,7 @@ use std::sync::{Arc, Mutex};
 
 /// A log that a test can read.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Log(Arc<Mutex<Vec<u8>>>);
+pub(crate) struct Log(Arc<Mutex<Vec<u8>>>);
 
 impl Write for Log {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
@@ -276,12 +276,12 @@ impl Write for Log {
 
 impl Log {
     /// All written bytes.
-    pub(super) fn text(&self) -> String {
+    pub(crate) fn text(&self) -> String {
         String::from_utf8(self.0.lock().unwrap().clone()).unwrap()
     }
 
     /// Every sent controlword, with the node.
-    pub(super) fn controlwords(&self) -> Vec<(u8, Controlword)> {
+    pub(crate) fn controlwords(&self) -> Vec<(u8, Controlword)> {
         let text = self.text();
         let words = text.lines().filter_map(|line| {
             let (id, data) = line.split_whitespace().last()?.split_once('#')?;

@@ -5,8 +5,8 @@ use masseter_scenario::{
     AccelerationUnit, DriveProfile, INCREMENTS, ObjectConfig, ObjectKey, ObjectRule, VelocityUnit,
 };
 
-use super::deviation::{Deviation, Outcome};
-use super::{object_words::value_text, settings::Survey};
+use crate::deviation::{Deviation, Outcome};
+use crate::{object_words::value_text, settings::Survey};
 
 /// Degrees, tenths of a degree and turns of the screw; millimetres and micrometres (CiA 303-2).
 const DEGREES: u32 = 0x0041_0000;
@@ -76,7 +76,7 @@ fn of_position(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Opt
 
 /// Units of the drive, as far as the drive has objects for them (60A8h to 60AAh). A value that `configure` writes
 /// counts, not the replaced value.
-pub(super) fn of_units(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Deviation> {
+pub(crate) fn of_units(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Deviation> {
     let units = &profile.units;
     let declared = [
         (0x60A9, units.velocity.code(), "velocity", "drive_profile.units.velocity"),
@@ -116,7 +116,7 @@ fn told(survey: &Survey, profile: &DriveProfile, object: ObjectAddress) -> Optio
 /// Ratios of the drive for its way, as far as the drive has them: gear, feed and encoder. A wrong ratio scales every
 /// motion. Without a lead the profile declares no travel, so a wrong gear is only doubtful. A feed decides the unit of
 /// 6064h; the encoder decides without one.
-pub(super) fn of_ratios(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Deviation> {
+pub(crate) fn of_ratios(survey: &Survey, profile: &DriveProfile, increment_m: f64) -> Vec<Deviation> {
     let units = &profile.units;
     let part = |index, subindex| told(survey, profile, ObjectAddress::new(index, subindex)).map(f64::from);
     let ratio = |index| Some(part(index, 1)? / part(index, 2).filter(|&turns| turns > 0.0)?);

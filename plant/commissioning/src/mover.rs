@@ -3,21 +3,21 @@
 use masseter_can::canopen::{NmtCommand, ObjectAddress};
 use masseter_can::cia402::{ControlBit, Controlword, StatusBit};
 use masseter_model::geometry::AXES;
+use masseter_plant::wanted::OFFSETS;
 use masseter_runtime::clock::SECOND_NS;
 use masseter_scenario::{AxisScale, DriveProfile, MASTER_NODE, ObjectKey, ObjectRule, Scenario};
 
-use super::loan::{Borrowed, Loan};
-use super::motion_error::{AxisError, MotionError, StopCause};
-use super::watch::{
+use crate::loan::{Borrowed, Loan};
+use crate::motion_error::{AxisError, MotionError, StopCause};
+use crate::watch::{
     Caution, Sample, Watch, read_position, seconds, stop_drive, switch_off_drive, switch_on_drive,
     wait_for_mode,
 };
-use super::{line::Line, line_error::LineError};
-use crate::master::wanted::OFFSETS;
+use crate::{line::Line, line_error::LineError};
 
 /// Profile position and homing (6060h).
-pub(super) const POSITIONING: i8 = 1;
-pub(super) const HOMING: i8 = 6;
+pub(crate) const POSITIONING: i8 = 1;
+pub(crate) const HOMING: i8 = 6;
 /// Time at rest with power on, and the time limit for it, ns.
 const STILL_NS: u64 = SECOND_NS;
 const RESTLESS_NS: u64 = 5 * SECOND_NS;
@@ -27,21 +27,21 @@ const NOISES: f64 = 3.0;
 const INCREMENTS: f64 = 3.0;
 
 /// One axis to be moved.
-pub(super) struct Mover<'a> {
-    pub(super) line: &'a mut Line,
+pub(crate) struct Mover<'a> {
+    pub(crate) line: &'a mut Line,
     scenario: &'a Scenario,
-    pub(super) axis: usize,
-    pub(super) operator: &'a mut Operator<'a>,
-    pub(super) caution: Caution,
-    pub(super) borrowed: Borrowed<'a>,
-    pub(super) watch: Watch,
+    pub(crate) axis: usize,
+    pub(crate) operator: &'a mut Operator<'a>,
+    pub(crate) caution: Caution,
+    pub(crate) borrowed: Borrowed<'a>,
+    pub(crate) watch: Watch,
     /// Half of the range of 6064h while the axis stood, m.
-    pub(super) noise_m: f64,
+    pub(crate) noise_m: f64,
 }
 
 impl<'a> Mover<'a> {
     /// Prepares a drive without power: pre-operational, the watched heartbeat, reduced limits.
-    pub(super) fn prepare(
+    pub(crate) fn prepare(
         line: &'a mut Line,
         scenario: &'a Scenario,
         axis: usize,
@@ -128,12 +128,12 @@ impl<'a> Mover<'a> {
     }
 
     /// Changes objects until the end.
-    pub(super) fn borrow(&mut self, loans: &[Loan]) -> Result<(), LineError> {
+    pub(crate) fn borrow(&mut self, loans: &[Loan]) -> Result<(), LineError> {
         self.borrowed.set_all(self.line, loans)
     }
 
     /// Refuses a target in the direction of a limit switch that is closed.
-    pub(super) fn check_way(&self, target: i32) -> Result<(), MotionError> {
+    pub(crate) fn check_way(&self, target: i32) -> Result<(), MotionError> {
         self.watch.check_way(self.scale().metres(target), self.backwards_m())
     }
 
@@ -143,37 +143,37 @@ impl<'a> Mover<'a> {
     }
 
     /// Scales of the axis.
-    pub(super) fn scale(&self) -> AxisScale {
+    pub(crate) fn scale(&self) -> AxisScale {
         self.scenario.scale(self.axis)
     }
 
     /// The profile of the drive.
-    pub(super) fn profile(&self) -> &'a DriveProfile {
+    pub(crate) fn profile(&self) -> &'a DriveProfile {
         self.scenario.profile(self.axis)
     }
 
     /// Position of the axis, m.
-    pub(super) fn position_m(&mut self) -> Result<f64, LineError> {
+    pub(crate) fn position_m(&mut self) -> Result<f64, LineError> {
         read_position(self.line, self.axis, &self.scale())
     }
 
     /// One look at the axis.
-    pub(super) fn look(&mut self) -> Result<Sample, MotionError> {
+    pub(crate) fn look(&mut self) -> Result<Sample, MotionError> {
         self.watch.look(self.line)
     }
 
     /// Sends a controlword.
-    pub(super) fn control(&mut self, word: Controlword) -> Result<(), LineError> {
+    pub(crate) fn control(&mut self, word: Controlword) -> Result<(), LineError> {
         self.line.control(self.axis, word)
     }
 
     /// Ends the motion for that reason.
-    pub(super) fn stopped<T>(&self, cause: StopCause) -> Result<T, MotionError> {
+    pub(crate) fn stopped<T>(&self, cause: StopCause) -> Result<T, MotionError> {
         Err(AxisError::Stopped(cause).of(self.axis))
     }
 
     /// Switches on in a mode, with the place of the axis as its target, and waits until brake and axis are ready.
-    pub(super) fn switch_on(&mut self, mode: i8) -> Result<(), MotionError> {
+    pub(crate) fn switch_on(&mut self, mode: i8) -> Result<(), MotionError> {
         self.borrow(&[Loan::new(0x6060, 0, mode as u32, 1)])?;
         wait_for_mode(self.line, self.axis, mode)?;
         let here = self.line.read_number(self.axis, ObjectAddress::new(0x6064, 0))?;
@@ -211,7 +211,7 @@ impl<'a> Mover<'a> {
     }
 
     /// Moves to a position in profile position; returns all looks from the set-point on.
-    pub(super) fn move_to(&mut self, target: i32) -> Result<Vec<Sample>, MotionError> {
+    pub(crate) fn move_to(&mut self, target: i32) -> Result<Vec<Sample>, MotionError> {
         self.check_way(target)?;
         let scale = self.scale();
         let Caution { speed_m_s, acceleration_m_s2, still_m, .. } = self.caution;
@@ -282,7 +282,7 @@ impl<'a> Mover<'a> {
     }
 
     /// Looks at an axis at rest for that time.
-    pub(super) fn dwell(&mut self, for_ns: u64) -> Result<Vec<Sample>, MotionError> {
+    pub(crate) fn dwell(&mut self, for_ns: u64) -> Result<Vec<Sample>, MotionError> {
         let until_ns = self.line.now_ns() + for_ns;
         let mut seen = Vec::new();
         while self.line.now_ns() < until_ns {
@@ -296,7 +296,7 @@ impl<'a> Mover<'a> {
     }
 
     /// Switches off an axis at rest; returns its way meanwhile, m.
-    pub(super) fn switch_off(&mut self) -> Result<f64, MotionError> {
+    pub(crate) fn switch_off(&mut self) -> Result<f64, MotionError> {
         switch_off_drive(self.line, self.axis, &self.scale(), &self.profile().brake)
     }
 
@@ -305,7 +305,7 @@ impl<'a> Mover<'a> {
     ///
     /// # Errors
     /// That of the motion, unless the proof of power off fails, or an old value has not returned.
-    pub(super) fn end_motion<T>(mut self, done: Result<T, MotionError>) -> Result<T, MotionError> {
+    pub(crate) fn end_motion<T>(mut self, done: Result<T, MotionError>) -> Result<T, MotionError> {
         let axis = self.axis;
         if done.is_err() {
             stop_drive(self.line, axis, &self.profile().brake)?;

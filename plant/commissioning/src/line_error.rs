@@ -6,9 +6,9 @@ use std::io;
 use masseter_can::canopen::{AbortCode, ObjectAddress};
 use masseter_can::{SendError, explain_errno};
 use masseter_model::geometry::AXIS_NAMES;
+use masseter_plant::{PlantError, sdo::SdoReason};
 
-use super::object_words::{object_name, value_text};
-use crate::{error::PlantError, master::sdo::SdoReason};
+use crate::object_words::{object_name, value_text};
 
 /// The reason for the end of a line.
 #[derive(Debug, thiserror::Error)]

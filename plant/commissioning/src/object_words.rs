@@ -2,8 +2,7 @@
 
 use masseter_can::canopen::{AbortCode, ObjectAddress};
 use masseter_drives::entry;
-
-use crate::master::sdo::SdoReason;
+use masseter_plant::sdo::SdoReason;
 
 /// Why the read of an object fails.
 pub fn reason_text(reason: SdoReason) -> String {

@@ -5,14 +5,14 @@ use std::fmt::{self, Display, Formatter};
 
 use masseter_can::canopen::ObjectAddress;
 use masseter_model::geometry::{AXES, AXIS_NAMES};
+use masseter_plant::{sdo::SdoReason, wanted::WantedDrive};
 use masseter_scenario::CanConfig;
 use serde::{Deserialize, Serialize};
 
-use super::line::{BootUps, Line};
-use super::line_error::{LineError, OtherMaster, Restarted};
-use super::object_words::{object_name, value_text};
-use super::settings::Survey;
-use crate::master::{sdo::SdoReason, wanted::WantedDrive};
+use crate::line::{BootUps, Line};
+use crate::line_error::{LineError, OtherMaster, Restarted};
+use crate::object_words::{object_name, value_text};
+use crate::settings::Survey;
 
 /// The identity object.
 const INDEX: u16 = 0x1018;

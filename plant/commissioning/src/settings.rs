@@ -5,12 +5,12 @@
 use std::collections::BTreeMap;
 
 use masseter_can::canopen::{Expedited, ObjectAddress};
+use masseter_plant::sdo::{SdoReason, number};
+use masseter_plant::wanted::{PdoLayout, PdoSetting, Setting, WantedDrive, may_keep};
 use masseter_scenario::{ObjectKey, ObjectRule};
 use serde::{Deserialize, Serialize};
 
-use super::{line::Line, line_error::LineError};
-use crate::master::sdo::{SdoReason, number};
-use crate::master::wanted::{PdoLayout, PdoSetting, Setting, WantedDrive, may_keep};
+use crate::{line::Line, line_error::LineError};
 
 /// PDOs and objects of a drive.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -182,7 +182,7 @@ impl Survey {
     }
 
     #[cfg(test)]
-    pub(super) fn insert(&mut self, object: ObjectAddress, value: u32) {
+    pub(crate) fn insert(&mut self, object: ObjectAddress, value: u32) {
         self.readings.insert(object, Ok(value.to_le_bytes().to_vec()));
     }
 

@@ -8,10 +8,10 @@ use masseter_runtime::clock::SECOND_NS;
 use masseter_scenario::{HomingConfig, ObjectKey, ObjectRule, Scenario};
 use serde::Serialize;
 
-use super::motion_error::{AxisError, MotionError, StopCause};
-use super::mover::{HOMING, Mover, Operator, POSITIONING, Wish};
-use super::watch::{Caution, read_position, seconds};
-use super::{line::Line, loan::Loan};
+use crate::motion_error::{AxisError, MotionError, StopCause};
+use crate::mover::{HOMING, Mover, Operator, POSITIONING, Wish};
+use crate::watch::{Caution, read_position, seconds};
+use crate::{line::Line, loan::Loan};
 
 /// Methods that make the present place home (6098h).
 const ON_THE_SPOT: [i8; 2] = [35, 37];

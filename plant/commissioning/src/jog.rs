@@ -7,11 +7,11 @@ use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_scenario::Scenario;
 use serde::Serialize;
 
-use super::line::Line;
-use super::motion_error::{AxisError, MotionError};
-use super::mover::{Mover, Operator, POSITIONING};
-use super::steps::{SyncAnswers, sync_answers};
-use super::watch::{Caution, Sample};
+use crate::line::Line;
+use crate::motion_error::{AxisError, MotionError};
+use crate::mover::{Mover, Operator, POSITIONING};
+use crate::steps::{SyncAnswers, sync_answers};
+use crate::watch::{Caution, Sample};
 
 /// The longest way of a jog, m.
 const MOST_M: f64 = 0.02;
@@ -144,7 +144,7 @@ pub struct StepResponse {
 
 impl StepResponse {
     /// Of everything seen since the set-point, from one position to another, m. Nearer than `window_m` is there.
-    pub(super) fn new(seen: &[Sample], [from_m, to_m]: [f64; 2], window_m: f64) -> Self {
+    pub(crate) fn new(seen: &[Sample], [from_m, to_m]: [f64; 2], window_m: f64) -> Self {
         let share = |sample: &Sample| (sample.position_m - from_m) / (to_m - from_m);
         let began_ns = seen.first().map_or(0, |sample| sample.at_ns);
         let time_s = |sample: &Sample| (sample.at_ns - began_ns) as f64 / SECOND_NS as f64;

@@ -9,15 +9,15 @@ use masseter_can::canopen::{
 };
 use masseter_can::{Frame, cia402::Controlword};
 use masseter_model::geometry::AXES;
+use masseter_plant::sdo::{SdoClient, SdoReason, number};
+use masseter_plant::wanted::{is_write_only, shown_bits};
+use masseter_plant::{Address, PlantError};
 use masseter_runtime::clock::MILLISECOND_NS;
 use masseter_scenario::{MASTER_NODE, ObjectKey, Scenario};
 use serde::{Deserialize, Serialize};
 
-use super::line_error::{LineError, MasterSign, Restarted};
-use super::traffic::{Heard, Strangers, Traffic};
-use crate::master::sdo::{SdoClient, SdoReason, number};
-use crate::master::wanted::{is_write_only, shown_bits};
-use crate::{error::PlantError, master::link::Address};
+use crate::line_error::{LineError, MasterSign, Restarted};
+use crate::traffic::{Heard, Strangers, Traffic};
 
 /// Silence of a server before the repetition of a request.
 const TIMEOUT_NS: u64 = 500 * MILLISECOND_NS;
@@ -33,7 +33,7 @@ const READ_AGAIN_NS: u64 = 5 * MILLISECOND_NS;
 
 /// The line.
 pub struct Line {
-    pub(super) traffic: Traffic,
+    pub(crate) traffic: Traffic,
     /// The axis whose drive this line has switched on.
     switched_on: Option<usize>,
     /// The ledger of old values; none if nobody needs old values after a kill.
@@ -56,7 +56,7 @@ impl Line {
     }
 
     /// Keeps the old values of a drive.
-    pub(super) fn keep_old_values(&mut self, axis: usize, values: &[OldValue]) -> Result<(), LineError> {
+    pub(crate) fn keep_old_values(&mut self, axis: usize, values: &[OldValue]) -> Result<(), LineError> {
         let Some(ledger) = &mut self.ledger else { return Ok(()) };
         ledger.keep(axis, values).map_err(|source| LineError::Ledger { axis, source })
     }
@@ -77,7 +77,7 @@ impl Line {
     }
 
     /// Queues a frame for the bus of an axis.
-    pub(super) fn send(&mut self, axis: usize, frame: Frame) -> Result<(), LineError> {
+    pub(crate) fn send(&mut self, axis: usize, frame: Frame) -> Result<(), LineError> {
         self.traffic.send(self.traffic.addresses[axis].bus, frame)
     }
 
@@ -113,7 +113,7 @@ impl Line {
     }
 
     /// Looks at intervals until a value is right or the time is over. Returns the last value.
-    pub(super) fn look_until<T: Copy, E: From<LineError>>(
+    pub(crate) fn look_until<T: Copy, E: From<LineError>>(
         &mut self,
         within_ns: u64,
         every_ns: u64,
@@ -154,7 +154,7 @@ impl Line {
     ///
     /// # Errors
     /// [`LineError`].
-    pub(super) fn read_if_there(
+    pub(crate) fn read_if_there(
         &mut self,
         axis: usize,
         object: ObjectAddress,
@@ -242,7 +242,7 @@ impl Line {
 
     /// Sends SYNC to the bus of an axis. Returns the time from its end to the start of the drive's process data, ns;
     /// none without process data.
-    pub(super) fn sync_answer_ns(&mut self, axis: usize) -> Result<Option<u64>, LineError> {
+    pub(crate) fn sync_answer_ns(&mut self, axis: usize) -> Result<Option<u64>, LineError> {
         (self.traffic.sync_ns, self.traffic.heard[axis].process_data_ns) = (None, None);
         self.send(axis, sync::frame())?;
         self.listen_until(SYNC_NS, |line| line.heard(axis).process_data_ns.is_some())?;
@@ -349,7 +349,7 @@ impl BootUps {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::commissioning::tests::Log;
+    use crate::tests::Log;
 
     fn line() -> (Line, Log) {
         let log = Log::default();

@@ -7,7 +7,7 @@ use masseter_can::cia402::{DriveState, StatuswordError};
 use masseter_model::geometry::AXIS_NAMES;
 use masseter_scenario::wording::shortest;
 
-use super::line_error::{LineError, OtherMaster, Restarted};
+use crate::line_error::{LineError, OtherMaster, Restarted};
 
 /// The reason for the stop of a motion.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
@@ -382,7 +382,7 @@ pub enum AxisError {
 
 impl AxisError {
     /// The error of a motion of that axis.
-    pub(super) const fn of(self, axis: usize) -> MotionError {
+    pub(crate) const fn of(self, axis: usize) -> MotionError {
         MotionError::OfAxis { axis, reason: self }
     }
 }

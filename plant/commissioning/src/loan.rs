@@ -3,32 +3,32 @@
 use std::mem;
 
 use masseter_can::canopen::ObjectAddress;
+use masseter_plant::wanted::value_bits;
 use masseter_scenario::{DriveProfile, ObjectKey, ObjectRule};
 
-use super::line::{Line, OldValue};
-use super::line_error::LineError;
-use crate::master::wanted::value_bits;
+use crate::line::{Line, OldValue};
+use crate::line_error::LineError;
 
 /// A value for the duration of a step.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Loan {
-    pub(super) object: ObjectAddress,
-    pub(super) value: u32,
-    pub(super) bytes: usize,
+pub(crate) struct Loan {
+    pub(crate) object: ObjectAddress,
+    pub(crate) value: u32,
+    pub(crate) bytes: usize,
     /// Whether the drive may lack the object or refuse the value, for every profile.
-    pub(super) may_lack: bool,
+    pub(crate) may_lack: bool,
 }
 
 impl Loan {
     /// The lowest bytes of a value.
-    pub(super) const fn new(index: u16, subindex: u8, value: u32, bytes: usize) -> Self {
+    pub(crate) const fn new(index: u16, subindex: u8, value: u32, bytes: usize) -> Self {
         Self { object: ObjectAddress::new(index, subindex), value, bytes, may_lack: false }
     }
 }
 
 /// The changed objects of a drive, in the order of their changes.
 #[derive(Debug)]
-pub(super) struct Borrowed<'a> {
+pub(crate) struct Borrowed<'a> {
     axis: usize,
     profile: &'a DriveProfile,
     old: Vec<OldValue>,
@@ -36,12 +36,12 @@ pub(super) struct Borrowed<'a> {
 
 impl<'a> Borrowed<'a> {
     /// No changes.
-    pub(super) const fn of_axis(axis: usize, profile: &'a DriveProfile) -> Self {
+    pub(crate) const fn of_axis(axis: usize, profile: &'a DriveProfile) -> Self {
         Self { axis, profile, old: Vec::new() }
     }
 
     /// Writes values by the profile's rules. Keeps all old values before the first write.
-    pub(super) fn set_all(&mut self, line: &mut Line, loans: &[Loan]) -> Result<(), LineError> {
+    pub(crate) fn set_all(&mut self, line: &mut Line, loans: &[Loan]) -> Result<(), LineError> {
         let mut writes = Vec::new();
         for loan in loans {
             if let Some(may_lack) = self.may_lack(loan)
@@ -95,7 +95,7 @@ impl<'a> Borrowed<'a> {
     }
 
     /// Sets the software limits (607Dh) to positions of 6064h, in increments. The lower limit is never above the upper.
-    pub(super) fn set_limits(&mut self, line: &mut Line, ends: [i32; 2]) -> Result<(), LineError> {
+    pub(crate) fn set_limits(&mut self, line: &mut Line, ends: [i32; 2]) -> Result<(), LineError> {
         let offset = self.limit_offset(line)?;
         let [lowest, highest] = ends.map(|end| end.saturating_sub(offset) as u32);
         let mut limits = [(1, lowest), (2, highest)].map(|(end, value)| Loan::new(0x607D, end, value, 4));
@@ -117,7 +117,7 @@ impl<'a> Borrowed<'a> {
     }
 
     /// Writes every old value back, the last change first. A failure does not stop the other writes.
-    pub(super) fn restore(&mut self, line: &mut Line) -> Result<(), LineError> {
+    pub(crate) fn restore(&mut self, line: &mut Line) -> Result<(), LineError> {
         let failures = write_back(line, self.axis, &mem::take(&mut self.old));
         let left: Vec<_> = failures.iter().rev().map(|(old, _)| *old).collect();
         let kept = line.keep_old_values(self.axis, &left);

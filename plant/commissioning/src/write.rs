@@ -2,14 +2,14 @@
 
 use masseter_can::canopen::{AbortCode, CobId, NmtCommand, ObjectAddress};
 use masseter_model::geometry::AXIS_NAMES;
+use masseter_plant::wanted::{COB_ID_BITS, PdoSetting, Setting, may_keep};
 use masseter_runtime::clock::MILLISECOND_NS;
 use masseter_scenario::{DriveProfile, ObjectKey, ObjectRule};
 use serde::Serialize;
 
-use super::object_words::{object_name, value_text};
-use super::settings::{Settings, Survey};
-use super::{deviation::as_text, line::Line, line_error::LineError};
-use crate::master::wanted::{COB_ID_BITS, PdoSetting, Setting, may_keep};
+use crate::object_words::{object_name, value_text};
+use crate::settings::{Settings, Survey};
+use crate::{deviation::as_text, line::Line, line_error::LineError};
 
 /// Longest time of a drive to become pre-operational, ns.
 const ENTER_NS: u64 = 100 * MILLISECOND_NS;
@@ -212,10 +212,10 @@ mod tests {
     use std::io;
 
     use masseter_can::canopen::NodeId;
+    use masseter_plant::wanted::WantedDrive;
     use masseter_scenario::Scenario;
 
     use super::*;
-    use crate::master::wanted::WantedDrive;
 
     const AXIS: usize = 3;
 

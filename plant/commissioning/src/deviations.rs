@@ -2,13 +2,13 @@
 
 use masseter_can::canopen::{CobId, ObjectAddress};
 use masseter_can::cia402::Statusword;
+use masseter_plant::wanted::{Setting, WantedDrive, WantedIdentity};
 use masseter_scenario::{DriveProfile, ObjectKey, ObjectRule};
 
-use super::deviation::{Deviation, Outcome};
-use super::object_words::{reason_text, value_text};
-use super::settings::{Difference, Settings, Survey};
-use super::units::{of_ratios, of_units};
-use crate::master::wanted::{Setting, WantedDrive, WantedIdentity};
+use crate::deviation::{Deviation, Outcome};
+use crate::object_words::{reason_text, value_text};
+use crate::settings::{Difference, Settings, Survey};
+use crate::units::{of_ratios, of_units};
 
 /// Bit of 6502h: cyclic synchronous position.
 const CYCLIC_POSITION: u32 = 1 << 7;
@@ -130,7 +130,7 @@ mod deviations_tests {
     use masseter_scenario::Scenario;
 
     use super::*;
-    use crate::commissioning::line::Line;
+    use crate::line::Line;
 
     /// Needs of this profile that emulated drives lack.
     fn of_profile(text: &str) -> Vec<(String, Outcome, String)> {

@@ -4,7 +4,7 @@ use std::io;
 use std::sync::{Arc, Mutex};
 
 use super::*;
-use crate::commissioning::loan::{Borrowed, Loan};
+use crate::loan::{Borrowed, Loan};
 
 /// A ledger that a test can read.
 #[derive(Debug, Clone, Default)]

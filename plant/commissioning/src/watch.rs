@@ -8,9 +8,9 @@ use masseter_model::geometry::AXES;
 use masseter_runtime::clock::{MILLISECOND_NS, SECOND_NS};
 use masseter_scenario::{AxisScale, BrakeConfig, Scenario};
 
-use super::line::{BootUps, Line};
-use super::line_error::LineError;
-use super::motion_error::{AxisError, MotionError, StopCause, Unproved};
+use crate::line::{BootUps, Line};
+use crate::line_error::LineError;
+use crate::motion_error::{AxisError, MotionError, StopCause, Unproved};
 
 /// Digital inputs (60FDh): limit switches.
 const INPUTS: ObjectAddress = ObjectAddress::new(0x60FD, 0);
@@ -76,12 +76,12 @@ pub struct Sample {
 
 /// The watch.
 #[derive(Debug)]
-pub(super) struct Watch {
+pub(crate) struct Watch {
     axis: usize,
     scales: [AxisScale; AXES],
     caution: Caution,
     /// The following error window, m.
-    pub(super) window_m: f64,
+    pub(crate) window_m: f64,
     /// Positions of all axes at the beginning, m.
     began_m: [f64; AXES],
     /// Emergencies received before.
@@ -94,22 +94,22 @@ pub(super) struct Watch {
 }
 
 /// 6041h.
-pub(super) fn read_status(line: &mut Line, axis: usize) -> Result<Statusword, LineError> {
+pub(crate) fn read_status(line: &mut Line, axis: usize) -> Result<Statusword, LineError> {
     Ok(Statusword(line.read_number(axis, ObjectAddress::new(0x6041, 0))? as u16))
 }
 
 /// The state in 6041h.
-pub(super) fn read_state(line: &mut Line, axis: usize) -> Result<DriveState, MotionError> {
+pub(crate) fn read_state(line: &mut Line, axis: usize) -> Result<DriveState, MotionError> {
     read_status(line, axis)?.state().map_err(|error| AxisError::Statusword(error).of(axis))
 }
 
 /// 6064h, m.
-pub(super) fn read_position(line: &mut Line, axis: usize, scale: &AxisScale) -> Result<f64, LineError> {
+pub(crate) fn read_position(line: &mut Line, axis: usize, scale: &AxisScale) -> Result<f64, LineError> {
     Ok(scale.metres(line.read_number(axis, ObjectAddress::new(0x6064, 0))? as i32))
 }
 
 /// The error code (603Fh), or 0 for a drive without one.
-pub(super) fn read_error_code(line: &mut Line, axis: usize) -> u16 {
+pub(crate) fn read_error_code(line: &mut Line, axis: usize) -> u16 {
     line.read_number(axis, ObjectAddress::new(0x603F, 0)).unwrap_or(0) as u16
 }
 
@@ -121,7 +121,7 @@ fn read_switches(line: &mut Line, axis: usize, place_m: f64) -> Result<Option<Sw
 
 impl Watch {
     /// Begins the watch; refuses a drive with power.
-    pub(super) fn begin(
+    pub(crate) fn begin(
         line: &mut Line,
         axis: usize,
         scales: [AxisScale; AXES],
@@ -146,7 +146,7 @@ impl Watch {
     ///
     /// # Errors
     /// [`AxisError::Stopped`].
-    pub(super) fn check_undisturbed(&self, line: &Line) -> Result<(), MotionError> {
+    pub(crate) fn check_undisturbed(&self, line: &Line) -> Result<(), MotionError> {
         let stopped = |cause| AxisError::Stopped(cause).of(self.axis);
         let mut all = 0..AXES;
         all.try_for_each(|axis| self.boot_ups.check_axis(line, axis)).map_err(|one| stopped(one.into()))?;
@@ -154,12 +154,12 @@ impl Watch {
     }
 
     /// Ignores the limit switches: homing searches for them.
-    pub(super) fn ignore_switches(&mut self) {
+    pub(crate) fn ignore_switches(&mut self) {
         self.switches = None;
     }
 
     /// Watches the limit switches again. Switches closed now end no motion, but allow none in their direction.
-    pub(super) fn heed_switches(&mut self, line: &mut Line) -> Result<(), LineError> {
+    pub(crate) fn heed_switches(&mut self, line: &mut Line) -> Result<(), LineError> {
         let place_m = read_position(line, self.axis, &self.scales[self.axis])?;
         self.switches = read_switches(line, self.axis, place_m)?;
         Ok(())
@@ -171,7 +171,7 @@ impl Watch {
     ///
     /// # Errors
     /// [`AxisError::OnSwitch`].
-    pub(super) fn check_way(&self, target_m: f64, noise_m: f64) -> Result<(), MotionError> {
+    pub(crate) fn check_way(&self, target_m: f64, noise_m: f64) -> Result<(), MotionError> {
         let (axis, Some(Switches { bits, place_m })) = (self.axis, self.switches) else { return Ok(()) };
         // The drive counts the other way on a reversed axis.
         let beyond_m = (target_m - place_m) * self.scales[axis].increment_m.signum();
@@ -186,7 +186,7 @@ impl Watch {
     ///
     /// # Errors
     /// [`AxisError::Stopped`] for what must stop the motion.
-    pub(super) fn look(&mut self, line: &mut Line) -> Result<Sample, MotionError> {
+    pub(crate) fn look(&mut self, line: &mut Line) -> Result<Sample, MotionError> {
         let (axis, scale) = (self.axis, self.scales[self.axis]);
         let at_ns = line.now_ns();
         let position_m = read_position(line, axis, &scale)?;
@@ -233,7 +233,7 @@ impl Watch {
         Ok((closed != 0).then_some(StopCause::LimitSwitch { bits }))
     }
 
-    pub(super) fn look_at_another(&mut self, line: &mut Line) -> Result<Option<StopCause>, MotionError> {
+    pub(crate) fn look_at_another(&mut self, line: &mut Line) -> Result<Option<StopCause>, MotionError> {
         let other = self.next;
         self.next = (other + 1) % AXES;
         if other == self.axis {
@@ -250,7 +250,7 @@ impl Watch {
 }
 
 /// Longest time of a drive from one state to the next, ns.
-pub(super) const TRANSITION_NS: u64 = SECOND_NS;
+pub(crate) const TRANSITION_NS: u64 = SECOND_NS;
 /// Time of the watch over an axis after the loss of its power, and of its last part, in which a brake holds the axis, ns.
 const SETTLING_NS: u64 = SECOND_NS;
 const HELD_NS: u64 = SECOND_NS / 2;
@@ -266,7 +266,7 @@ const REPEAT_NS: u64 = 200 * MILLISECOND_NS;
 /// Switches a drive on, up to "operation enabled". The brake opens then: the axis may not move before it is open. A
 /// restarted drive has lost its reduced limits, and gets no power. A drive that restarts later is no longer ready to
 /// switch on, and takes no further word.
-pub(super) fn switch_on_drive(line: &mut Line, axis: usize, watch: &Watch) -> Result<(), MotionError> {
+pub(crate) fn switch_on_drive(line: &mut Line, axis: usize, watch: &Watch) -> Result<(), MotionError> {
     for (word, wanted) in [
         (Controlword::SHUTDOWN, DriveState::ReadyToSwitchOn),
         (Controlword::SWITCH_ON, DriveState::SwitchedOn),
@@ -288,7 +288,7 @@ pub(super) fn switch_on_drive(line: &mut Line, axis: usize, watch: &Watch) -> Re
 ///
 /// # Errors
 /// [`AxisError::Dropped`] and [`AxisError::Creeps`] for an axis that nothing holds without power.
-pub(super) fn switch_off_drive(
+pub(crate) fn switch_off_drive(
     line: &mut Line,
     axis: usize,
     scale: &AxisScale,
@@ -305,7 +305,7 @@ pub(super) fn switch_off_drive(
 ///
 /// # Errors
 /// [`AxisError::Dropped`] and [`AxisError::Creeps`] for an axis that nothing holds.
-pub(super) fn watch_unpowered(
+pub(crate) fn watch_unpowered(
     line: &mut Line,
     axis: usize,
     scale: &AxisScale,
@@ -332,14 +332,14 @@ pub(super) fn watch_unpowered(
 ///
 /// # Errors
 /// [`AxisError::StaysOn`] unless the statusword proves that the drive is off.
-pub(super) fn stop_drive(line: &mut Line, axis: usize, brake: &BrakeConfig) -> Result<(), MotionError> {
+pub(crate) fn stop_drive(line: &mut Line, axis: usize, brake: &BrakeConfig) -> Result<(), MotionError> {
     // The drive may stay in the quick stop (605Ah = 5 or 6): the voltage goes after the same time.
     let _ = repeat(line, axis, Controlword::QUICK_STOP);
     disable_voltage(line, axis)?;
     Ok(line.listen(seconds(brake.close_s))?)
 }
 
-pub(super) fn disable_voltage(line: &mut Line, axis: usize) -> Result<(), MotionError> {
+pub(crate) fn disable_voltage(line: &mut Line, axis: usize) -> Result<(), MotionError> {
     repeat(line, axis, Controlword::DISABLE_VOLTAGE).map_err(|reason| AxisError::StaysOn(reason).of(axis))?;
     line.note_off(axis);
     Ok(())
@@ -364,7 +364,7 @@ fn repeat(line: &mut Line, axis: usize, word: Controlword) -> Result<(), Unprove
 }
 
 /// Waits until a drive shows a mode of operation (6061h).
-pub(super) fn wait_for_mode(line: &mut Line, axis: usize, wanted: i8) -> Result<(), MotionError> {
+pub(crate) fn wait_for_mode(line: &mut Line, axis: usize, wanted: i8) -> Result<(), MotionError> {
     let mode = |line: &mut Line| {
         let mode = line.read_number(axis, ObjectAddress::new(0x6061, 0))?;
         Ok::<_, LineError>(mode as i8)
@@ -374,7 +374,7 @@ pub(super) fn wait_for_mode(line: &mut Line, axis: usize, wanted: i8) -> Result<
 }
 
 /// The state of a drive when the condition holds, or at the end of the time.
-pub(super) fn wait_for_state(
+pub(crate) fn wait_for_state(
     line: &mut Line,
     axis: usize,
     within_ns: u64,
@@ -384,6 +384,6 @@ pub(super) fn wait_for_state(
 }
 
 /// Seconds in ns.
-pub(super) fn seconds(time_s: f64) -> u64 {
+pub(crate) fn seconds(time_s: f64) -> u64 {
     (time_s * SECOND_NS as f64) as u64
 }
