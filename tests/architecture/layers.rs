@@ -7,7 +7,7 @@ use super::workspace::{crate_roots, list, metadata, text, within};
 
 /// The crates of the workspace that each crate may use, all by their folders. The root package may use all
 /// but the programs that a run does not need.
-const MAY_USE: [(&str, &[&str]); 32] = [
+const MAY_USE: [(&str, &[&str]); 33] = [
     ("shared/can", &[]),
     ("shared/model", &[]),
     ("shared/scenario", &["shared/can", "shared/model"]),
@@ -28,7 +28,12 @@ const MAY_USE: [(&str, &[&str]); 32] = [
     ),
     // Stands in for a crate of crates.io.
     ("shared/no_bindgen", &[]),
-    ("controller", &["shared/can", "shared/model", "shared/scenario", "shared/runtime"]),
+    // Files of motions are read without messages and without the mechanism's solutions.
+    ("controller/recorded_motion", &["shared/model", "shared/scenario"]),
+    (
+        "controller",
+        &["shared/can", "shared/model", "shared/scenario", "shared/runtime", "controller/recorded_motion"],
+    ),
     ("rig/bindings/c", &["shared/model", "shared/runtime", "shared/scenario", "controller"]),
     ("rig/bindings/drives", &["shared/can", "shared/features", "plant/drives"]),
     (
@@ -68,6 +73,7 @@ const MAY_USE: [(&str, &[&str]); 32] = [
             "shared/scenario",
             "shared/runtime",
             "controller",
+            "controller/recorded_motion",
             "rig/record/recording",
             // Exit codes.
             "rig/show/terminal",

@@ -10,10 +10,9 @@
 //! neither discs, muscles nor tooth contacts guide anything.
 
 use masseter_model::geometry::{Actuators, LEGS, Mechanism, Pose, Vec3};
+use masseter_recorded_motion::{MotionError, condylar_middle, jaw_points, ranges_of};
 use masseter_scenario::{JawConfig, JawSide};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
-
-use super::{TrajectoryError, ranges_of, require};
 
 /// Largest error of a reached amplitude, mm.
 const REACHED_MM: f64 = 1e-6;
@@ -61,24 +60,6 @@ struct CondylarLine {
     direction: Vec3,
 }
 
-/// Incisal point, right and left condyle in the jaw frame at the closed pose, m.
-pub(super) fn jaw_points(jaw: &JawConfig) -> Result<[Vec3; 3], TrajectoryError> {
-    let middle = condylar_middle(jaw)?;
-    let aside = Vec3::new(0.0, jaw.bonwill_side_m / 2.0, 0.0);
-    Ok([Vec3::zeros(), middle - aside, middle + aside])
-}
-
-/// The middle between the condyles in the jaw frame at the closed pose.
-pub(super) fn condylar_middle(jaw: &JawConfig) -> Result<Vec3, TrajectoryError> {
-    let side_m = jaw.bonwill_side_m;
-    let balkwill_deg = jaw.balkwill_angle_deg;
-    jaw.check_ranges(ranges_of("jaw"))?;
-    require("jaw.balkwill_angle_deg", balkwill_deg, (0.0..90.0).contains(&balkwill_deg), "0 to below 90")?;
-    let height_m = side_m * 3f64.sqrt() / 2.0;
-    let (sin, cos) = balkwill_deg.to_radians().sin_cos();
-    Ok(Vec3::new(-height_m * cos, 0.0, height_m * sin))
-}
-
 impl Mandible {
     /// The inclination and the Bennett angle set the paths along which the condyles glide.
     pub(super) fn new(
@@ -86,7 +67,7 @@ impl Mandible {
         inclination_deg: f64,
         bennett_angle_deg: f64,
         working: JawSide,
-    ) -> Result<Self, TrajectoryError> {
+    ) -> Result<Self, MotionError> {
         let (down, forward) = inclination_deg.to_radians().sin_cos();
         let (inward, straight) = bennett_angle_deg.to_radians().sin_cos();
         let working = working.sign();
@@ -102,7 +83,7 @@ impl Mandible {
     }
 
     /// A mandible for symmetric motions.
-    pub(super) fn symmetric(jaw: &JawConfig, inclination_deg: f64) -> Result<Self, TrajectoryError> {
+    pub(super) fn symmetric(jaw: &JawConfig, inclination_deg: f64) -> Result<Self, MotionError> {
         Self::new(jaw, inclination_deg, 0.0, JawSide::Left)
     }
 
@@ -169,7 +150,7 @@ pub(super) fn reach(
     amplitude_mm: f64,
     highest: f64,
     travel_m: impl Fn(f64) -> Option<f64>,
-) -> Result<f64, TrajectoryError> {
+) -> Result<f64, MotionError> {
     let (mut below, mut above) = (0.0, highest);
     for _ in 0..60 {
         let middle = f64::midpoint(below, above);
@@ -178,7 +159,7 @@ pub(super) fn reach(
     }
     let reached_mm = 1000.0 * travel_m(below).unwrap_or_default();
     if amplitude_mm - reached_mm > REACHED_MM {
-        return Err(TrajectoryError(format!(
+        return Err(MotionError(format!(
             "{name} of {amplitude_mm:?} mm is out of reach: the mandible reaches at most {reached_mm:.1} mm; \
              choose a smaller amplitude"
         )));
@@ -199,7 +180,7 @@ pub(super) struct JawFrame {
 }
 
 impl JawFrame {
-    pub(super) fn new(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Self, TrajectoryError> {
+    pub(super) fn new(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Self, MotionError> {
         let closed = closed_pose(jaw, mechanism)?;
         let jaw_in_platform = jaw_in_platform(jaw, &closed);
         Ok(Self { jaw: closed * jaw_in_platform, platform_in_jaw: jaw_in_platform.inverse() })
@@ -220,12 +201,12 @@ fn jaw_in_platform(jaw: &JawConfig, closed: &Pose) -> Pose {
 ///
 /// # Errors
 /// When a value lies outside its range, or no such pose exists.
-pub fn closed_pose(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Pose, TrajectoryError> {
+pub fn closed_pose(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Pose, MotionError> {
     let JawConfig { closed_leg_m, closed_offset_m, .. } = *jaw;
     jaw.check_ranges(ranges_of("jaw"))?;
     let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [closed_leg_m; LEGS] };
     let closed = crate::kinematics::solve_completely(mechanism, &actuators).map_err(|error| {
-        TrajectoryError(format!("jaw.closed_leg_m = {closed_leg_m:?} m gives no closed pose: {error}"))
+        MotionError(format!("jaw.closed_leg_m = {closed_leg_m:?} m gives no closed pose: {error}"))
     })?;
     Ok(Translation3::from(closed_offset_m) * closed.pose)
 }
@@ -234,7 +215,7 @@ pub fn closed_pose(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Pose, Traje
 ///
 /// # Errors
 /// When a dimension of the mandible lies outside its range.
-pub fn closed_jaw_points(jaw: &JawConfig, closed: &Pose) -> Result<[Vec3; 3], TrajectoryError> {
+pub fn closed_jaw_points(jaw: &JawConfig, closed: &Pose) -> Result<[Vec3; 3], MotionError> {
     let jaw_in_platform = jaw_in_platform(jaw, closed);
     Ok(jaw_points(jaw)?.map(|point| jaw_in_platform.transform_point(&point.into()).coords))
 }
@@ -247,21 +228,6 @@ mod tests {
 
     fn mandible(working: JawSide) -> Mandible {
         Mandible::new(&JawConfig::default(), 40.0, 8.0, working).unwrap()
-    }
-
-    #[test]
-    fn a_jaw_of_impossible_size_is_refused() {
-        let of = |bonwill_side_m, balkwill_angle_deg| {
-            let jaw = JawConfig { bonwill_side_m, balkwill_angle_deg, ..JawConfig::default() };
-            condylar_middle(&jaw).map_err(|error| error.to_string())
-        };
-        assert!([(0.01, 0.0), (1.0, 89.9)].into_iter().all(|(side_m, deg)| of(side_m, deg).is_ok()));
-        for side_m in [0.0099, 1.01, 3.8e173, f64::NAN] {
-            assert!(of(side_m, 22.5).is_err_and(|error| error.contains("0.01 to 1 m")), "{side_m}");
-        }
-        for deg in [-0.1, 90.0] {
-            assert!(of(0.1, deg).is_err_and(|error| error.contains("0 to below 90")), "{deg}");
-        }
     }
 
     /// Ways of the condyles, working and balancing, metres.

@@ -2,12 +2,12 @@
 //! motion starts and ends at rest on its unchanged path.
 
 use masseter_model::geometry::{Mechanism, Pose};
+use masseter_recorded_motion::{MotionError, Recording, import, require};
 use masseter_scenario::{JawConfig, MotionConfig, Scenario};
 
 use super::generators::{Chewing, Excursion, minimum_jerk_integral};
+use super::interpolate;
 use super::mandible::JawFrame;
-use super::recording::Recording;
-use super::{TrajectoryError, interpolate, require};
 
 /// Time of the clock to full speed, and to a stop, s.
 const RAMP_S: f64 = 0.5;
@@ -55,7 +55,7 @@ impl Trajectory {
         jaw: &JawConfig,
         mechanism: &Mechanism,
         duration_s: Option<f64>,
-    ) -> Result<Self, TrajectoryError> {
+    ) -> Result<Self, MotionError> {
         if let Some(duration_s) = duration_s {
             require("duration_s", duration_s, duration_s > 0.0, "above 0")?;
         }
@@ -65,7 +65,7 @@ impl Trajectory {
             MotionConfig::Opening(config) => Motion::Excursion(Excursion::opening(config, jaw)?),
             MotionConfig::Protrusion(config) => Motion::Excursion(Excursion::protrusion(config, jaw)?),
             MotionConfig::Lateral(config) => Motion::Excursion(Excursion::lateral(config, jaw)?),
-            MotionConfig::File(config) => Motion::Recording(super::plausible::import(config, jaw)?),
+            MotionConfig::File(config) => Motion::Recording(import(config, jaw)?),
         };
         let clock = motion.clock(duration_s);
         Ok(Self { motion, clock, frame })
@@ -75,7 +75,7 @@ impl Trajectory {
     ///
     /// # Errors
     /// Those of [`Self::new`].
-    pub fn of_scenario(scenario: &Scenario, mechanism: &Mechanism) -> Result<Self, TrajectoryError> {
+    pub fn of_scenario(scenario: &Scenario, mechanism: &Mechanism) -> Result<Self, MotionError> {
         let motion = Self::new(&scenario.motion, &scenario.jaw, mechanism, scenario.duration_s)?;
         Ok(motion.slowed(scenario.dry.speed_now()))
     }
@@ -152,8 +152,7 @@ impl Trajectory {
 
     /// The doubts about a recording, each with its line; none for a generator.
     pub fn doubts(&self) -> Vec<String> {
-        let Some(recording) = self.recording() else { return Vec::new() };
-        recording.doubts.iter().cloned().chain(super::doubts::jumps(&recording.glitches)).collect()
+        self.recording().map_or_else(Vec::new, Recording::all_doubts)
     }
 
     /// File and line, `motion.csv:7`, of the recording nearest to a time of the trajectory; none for a generator.

@@ -2,8 +2,8 @@
 
 use std::fmt::Write;
 
-use masseter_controller::trajectory::{Frame, Gap, Glitch, PointFigures, Range, RecordingSurvey};
 use masseter_judge::{RecordedError, RecordedFigures};
+use masseter_recorded_motion::{Frame, Gap, Glitch, PointFigures, Range, RecordingSurvey};
 use masseter_scenario::wording::counted;
 
 use super::found::{Found, Judged, Strokes, Suggestion};

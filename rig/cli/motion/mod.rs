@@ -48,7 +48,7 @@ pub(crate) fn motion(args: &MotionArgs) -> anyhow::Result<Exit> {
     let scenario = read_scenario_with(args.scenario.as_deref(), play)?;
     let found = self::found::Found::new(&scenario, &args.file)?;
     if let (Some(path), masseter_scenario::MotionConfig::File(file)) = (&args.write, &scenario.motion) {
-        write_beside(&args.file, path, &masseter_controller::trajectory::plain_form(file, &scenario.jaw)?)?;
+        write_beside(&args.file, path, &masseter_recorded_motion::plain_form(file, &scenario.jaw)?)?;
     }
     if let Some(path) = &args.svg {
         write_beside(&args.file, path, &picture::svg(&found.survey))?;

@@ -1,7 +1,7 @@
 //! The motion as a picture: paths of the incisal point and the condyles, and their course.
 
 use masseter_charts::{Axis, BLUE, Chart, GREEN, Look, RED, Series, VERMILION, drawing};
-use masseter_controller::trajectory::{Glitch, RecordingSurvey, SurveyRow};
+use masseter_recorded_motion::{Glitch, RecordingSurvey, SurveyRow};
 
 const COLOURS: [&str; 3] = [BLUE, VERMILION, GREEN];
 /// Size of the chart of a path, px.

@@ -2,8 +2,8 @@
 //!
 //! Values are SI numbers; states are their codes. A value that a cycle does not have is none, never a guess.
 
-use masseter_controller::trajectory::recorded_signals;
 use masseter_model::geometry::{AXES, AXIS_NAMES, Vec3};
+use masseter_recorded_motion::recorded_signals;
 use masseter_runtime::messages::codes::{ControllerState, DriveRequest, DriveState, NO_DRIVE_STATE};
 use masseter_runtime::messages::{Truth, WORKS};
 use masseter_runtime::named::{Declared, PlayedMotion};

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use masseter_model::geometry::{Pose, Vec3};
 use nalgebra::{SVector, UnitQuaternion, Vector6};
 
-use super::doubts::{Glitch, doubts, glitches};
+use super::doubts::{Glitch, doubts, glitches, jumps};
 use super::row::{Located, Sample};
 
 /// Least rate of the even grid, Hz, well above the frequencies of a jaw. Faster samples keep their rate, because a
@@ -25,7 +25,7 @@ const MARGIN_PERIODS: f64 = 3.0;
 
 /// Jaw displacements over the recording's own time, from 0.
 #[derive(Debug, Clone)]
-pub(super) struct Recording {
+pub struct Recording {
     path: PathBuf,
     time_s: Vec<f64>,
     lines: Vec<u64>,
@@ -36,9 +36,9 @@ pub(super) struct Recording {
     /// The largest turn, degrees, if it makes the markers' centroid a bad substitute for the incisal point.
     pub centroid_turn_deg: Option<f64>,
     /// Other doubts than the glitches, with the line.
-    pub doubts: Vec<String>,
+    pub(super) doubts: Vec<String>,
     /// Rows that leave the path of their neighbours.
-    pub glitches: Vec<Glitch>,
+    pub(super) glitches: Vec<Glitch>,
 }
 
 impl Recording {
@@ -72,34 +72,44 @@ impl Recording {
         })
     }
 
-    pub(super) fn length_s(&self) -> f64 {
+    /// From the first to the last row, s.
+    pub fn length_s(&self) -> f64 {
         self.time_s[self.time_s.len() - 1]
     }
 
     /// Displacement of the jaw from the closed pose, jaw frame.
-    pub(super) fn displacement(&self, motion_s: f64) -> Pose {
+    #[inline]
+    pub fn displacement(&self, motion_s: f64) -> Pose {
         self.pose(&self.curve.at(motion_s))
     }
 
     /// The same without the low-pass, as the rows have it.
-    pub(super) fn recorded(&self, motion_s: f64) -> Pose {
+    #[inline]
+    pub fn recorded(&self, motion_s: f64) -> Pose {
         self.pose(&self.raw.at(motion_s))
     }
 
     /// The times of the rows after one time and up to another.
-    pub(super) fn rows_between(&self, after_s: f64, to_s: f64) -> &[f64] {
+    #[inline]
+    pub fn rows_between(&self, after_s: f64, to_s: f64) -> &[f64] {
         let end = self.time_s.partition_point(|&t_s| t_s <= to_s);
         let begin = self.time_s.partition_point(|&t_s| t_s <= after_s).min(end);
         &self.time_s[begin..end]
     }
 
+    /// The doubts, each with its line, and those about glitches.
+    pub fn all_doubts(&self) -> Vec<String> {
+        self.doubts.iter().cloned().chain(jumps(&self.glitches)).collect()
+    }
+
+    #[inline]
     fn pose(&self, at: &Vector6<f64>) -> Pose {
         let turn = UnitQuaternion::from_scaled_axis(Vec3::new(at[3], at[4], at[5]));
         Pose::from_parts(Vec3::new(at[0], at[1], at[2]).into(), self.first_rotation * turn)
     }
 
     /// File and line with the nearest time.
-    pub(super) fn source_line(&self, motion_s: f64) -> String {
+    pub fn source_line(&self, motion_s: f64) -> String {
         let right = self.time_s.partition_point(|&t_s| t_s < motion_s).min(self.time_s.len() - 1);
         let left = right.saturating_sub(1);
         let nearest = if motion_s - self.time_s[left] < self.time_s[right] - motion_s { left } else { right };
@@ -149,6 +159,7 @@ impl<const N: usize> Spline<N> {
     }
 
     /// The value at a time; held beyond the ends. Finds its span in O(log n), allocates nothing.
+    #[inline]
     fn at(&self, t_s: f64) -> SVector<f64, N> {
         let last = self.time_s.len() - 1;
         let t_s = t_s.clamp(self.time_s[0], self.time_s[last]);

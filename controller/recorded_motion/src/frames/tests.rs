@@ -18,7 +18,7 @@ use super::*;
 
 /// A recording with the axes that are right as it stands.
 fn recordings() -> Vec<(PathBuf, [&'static str; 3])> {
-    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples");
+    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples");
     let mut found = vec![
         (examples.join("patient.csv"), ["+x", "+y", "+z"]),
         (examples.join("jaw.csv"), ["+x", "+y", "+z"]),
@@ -168,7 +168,8 @@ fn the_right_frame_of_24_is_the_best_or_among_equals_in_every_unit() {
     }
     fs::remove_dir_all(&folder).unwrap();
     println!("{}", table.join("\n"));
-    let shown = fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/motions.md")).unwrap();
+    let shown =
+        fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/motions.md")).unwrap();
     // The recordings of a person are no part of the project, but their rows are.
     let absent: Vec<_> = table.iter().filter(|row| !shown.contains(*row)).collect();
     assert!(absent.is_empty(), "docs/motions.md lacks {absent:#?}");

@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use masseter_scenario::{FileConfig, JawConfig};
 
-use super::{TrajectoryError, import::Source, table::LARGEST_GAP_S};
+use super::{MotionError, import::Source, table::LARGEST_GAP_S};
 
 /// Largest difference of times by rounding, s.
 const SAME_TIME_S: f64 = 1e-6;
@@ -27,6 +27,7 @@ pub struct RecordedSignal {
 
 impl RecordedSignal {
     /// The value of the latest row at a time of the motion, s; none where it is lost.
+    #[inline]
     pub fn at(&self, motion_s: f64) -> Option<f64> {
         let next = self.time_s.partition_point(|time_s| *time_s <= motion_s + SAME_TIME_S);
         let row = next.checked_sub(1)?;
@@ -39,10 +40,7 @@ impl RecordedSignal {
 ///
 /// # Errors
 /// For an unusable file: the line, the reason and a remedy.
-pub fn recorded_signals(
-    config: &FileConfig,
-    jaw: &JawConfig,
-) -> Result<Vec<RecordedSignal>, TrajectoryError> {
+pub fn recorded_signals(config: &FileConfig, jaw: &JawConfig) -> Result<Vec<RecordedSignal>, MotionError> {
     let table = Source::read(config, jaw)?.table;
     let (extras, begin_s) = (&table.extras, table.rows[0].time_s);
     let time_s: Arc<[f64]> = extras.rows.iter().map(|row| row.time_s - begin_s).collect();

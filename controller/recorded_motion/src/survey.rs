@@ -1,6 +1,6 @@
 //! A survey of a recorded motion, before its use.
 //!
-//! The survey describes the file. [`check`](super::check) judges whether the mechanism can follow the motion.
+//! The survey describes the file. Whether the mechanism can follow the motion is not judged here.
 
 use masseter_model::geometry::Vec3;
 use masseter_scenario::{FileConfig, JawConfig};
@@ -130,12 +130,12 @@ pub struct SurveyRow {
 ///
 /// # Errors
 /// For an unusable file: the line, the reason and a remedy.
-pub fn survey(config: &FileConfig, jaw: &JawConfig) -> Result<RecordingSurvey, super::TrajectoryError> {
+pub fn survey(config: &FileConfig, jaw: &JawConfig) -> Result<RecordingSurvey, super::MotionError> {
     let source = Source::read(config, jaw)?;
     let samples = source.samples()?;
     let recording = source.recording(&samples)?;
     let Judgement { implausible, likely, frames } = Judgement::new(&source, &samples, config, jaw)?;
-    let points = super::mandible::jaw_points(jaw)?;
+    let points = super::jaw::jaw_points(jaw)?;
     let table = &source.table;
     let row = |sample: &Sample| SurveyRow {
         time_s: sample.time_s - samples[0].time_s,
