@@ -6,7 +6,7 @@ use masseter_runtime::lifecycle::attach::{AttachError, attach};
 use masseter_runtime::lifecycle::{ProcessArguments, ProcessContext, ProcessError};
 use masseter_scenario::Scenario;
 
-use crate::trajectory::{MotionError, Trajectory};
+use crate::trajectory::{Trajectory, TrajectoryError};
 use crate::{motion_controller::MotionController, pose_law::PoseLaw};
 
 /// Builds a controller for a scenario, its mechanism and its motion.
@@ -26,7 +26,7 @@ pub enum ControllerError {
     Geometry(#[from] GeometryError),
     /// The motion.
     #[error(transparent)]
-    Trajectory(#[from] MotionError),
+    Trajectory(#[from] TrajectoryError),
 }
 
 /// Runs the controller of `build` to its end.

@@ -10,7 +10,7 @@ use nalgebra::Vector6;
 
 use crate::forces::{Model, derivatives};
 use crate::kinematics::{ForwardError, ForwardTracker};
-use crate::trajectory::{MotionError, Trajectory, interpolate, minimum_jerk};
+use crate::trajectory::{Trajectory, TrajectoryError, interpolate, minimum_jerk};
 
 /// Largest error of the length of a unit quaternion that a caller gives.
 const MOST_NORM_ERROR: f64 = 1e-6;
@@ -83,7 +83,7 @@ pub enum RobotModelError {
     Geometry(#[from] GeometryError),
     /// The motion of the scenario.
     #[error(transparent)]
-    Trajectory(#[from] MotionError),
+    Trajectory(#[from] TrajectoryError),
     /// Positions without a pose.
     #[error(transparent)]
     Forward(#[from] ForwardError),

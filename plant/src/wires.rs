@@ -12,7 +12,10 @@ use crate::{master::sockets::SocketLink, simulator::emulation::virtual_link::Vir
 
 /// The buses with their time.
 #[derive(Debug)]
-pub enum Wires {
+pub struct Wires(Kind);
+
+#[derive(Debug)]
+enum Kind {
     /// Simulated with the emulated drives, up to a time, ns.
     Simulated(Box<VirtualLink>, u64),
     /// The interfaces, in real time.
@@ -22,9 +25,9 @@ pub enum Wires {
 /// The same call on either kind of buses.
 macro_rules! on_link {
     ($wires:expr, $link:ident => $call:expr) => {
-        match $wires {
-            Wires::Simulated($link, _) => $call,
-            Wires::Real($link) => $call,
+        match &mut $wires.0 {
+            Kind::Simulated($link, _) => $call,
+            Kind::Real($link) => $call,
         }
     };
 }
@@ -35,18 +38,23 @@ impl Wires {
     /// # Errors
     /// [`PlantError`] for interfaces that cannot be opened and for buses that cannot be built.
     pub fn open(scenario: &Scenario) -> Result<Self, PlantError> {
-        Ok(if scenario.can.is_virtual() {
-            Self::Simulated(Box::new(VirtualLink::new(scenario, 0, 0)?), 0)
+        Ok(Self(if scenario.can.is_virtual() {
+            Kind::Simulated(Box::new(VirtualLink::new(scenario, 0, 0)?), 0)
         } else {
-            Self::Real(SocketLink::open(scenario, clock::now_ns())?)
-        })
+            Kind::Real(SocketLink::open(scenario, clock::now_ns())?)
+        }))
+    }
+
+    /// Whether these are interfaces in real time.
+    pub fn are_real(&self) -> bool {
+        matches!(self.0, Kind::Real(_))
     }
 
     /// The present time, ns: simulated from 0, or the machine's.
     pub fn now_ns(&self) -> u64 {
-        match self {
-            Self::Simulated(_, now_ns) => *now_ns,
-            Self::Real(_) => clock::now_ns(),
+        match &self.0 {
+            Kind::Simulated(_, now_ns) => *now_ns,
+            Kind::Real(_) => clock::now_ns(),
         }
     }
 
@@ -55,13 +63,13 @@ impl Wires {
     /// # Errors
     /// [`PlantError`] for a mechanism that cannot be moved on, and for a file that cannot be written.
     pub fn pass(&mut self, for_ns: u64) -> Result<(), PlantError> {
-        match self {
-            Self::Simulated(link, now_ns) => {
+        match &mut self.0 {
+            Kind::Simulated(link, now_ns) => {
                 *now_ns += for_ns;
                 link.advance(*now_ns)?;
                 link.emulation.save_memory()
             }
-            Self::Real(_) => {
+            Kind::Real(_) => {
                 clock::sleep_until(clock::now_ns() + for_ns);
                 Ok(())
             }
@@ -86,7 +94,7 @@ impl Wires {
         on_link!(self, link => link.port(bus).receive(now_ns))
     }
 
-    /// The next frame of any node, this one too.
+    /// The next frame of any node, this one too; none also after an error.
     pub fn tap(&mut self, bus: usize) -> Option<Tapped> {
         let now_ns = self.now_ns();
         on_link!(self, link => link.tap(bus, now_ns)).ok().flatten()

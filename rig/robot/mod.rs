@@ -1,7 +1,7 @@
 //! `masseter robot`: the bring-up of a robot as a sequence of steps, each with a safe reaction and evidence.
 //!
-//! A later step refuses without the [evidence](evidence) of the earlier one. The procedures are in the plant's crate
-//! ([`masseter_commissioning`]): these modules hold arguments, files and text.
+//! A later step refuses without the [evidence](evidence) of the earlier one. The procedures are in
+//! [`masseter_commissioning`]: these modules hold arguments, files and text.
 
 mod args;
 mod basis;

@@ -15,7 +15,7 @@ use nalgebra::{Matrix3, UnitQuaternion};
 use serde::Serialize;
 
 use super::import::{Axes, SIGNED_AXES, Source};
-use super::{MotionError, doubts::largest, jaw::condylar_middle, row::Located, table::Format};
+use super::{TrajectoryError, doubts::largest, jaw::condylar_middle, row::Located, table::Format};
 
 /// A turn moves the incisal point by this length a radian, m.
 const LEVER_M: f64 = 0.08;
@@ -104,7 +104,7 @@ impl Frames {
         source: &Source,
         config: &FileConfig,
         jaw: &JawConfig,
-    ) -> Result<Option<Self>, MotionError> {
+    ) -> Result<Option<Self>, TrajectoryError> {
         let evidence = Evidence::new(source, jaw).map_err(|problem| problem.in_file(&config.path))?;
         let Some(evidence) = evidence else { return Ok(None) };
         let mut frames: Vec<_> = right_handed().map(|(names, axes)| evidence.frame(names, &axes)).collect();

@@ -14,7 +14,7 @@ use nalgebra::{Matrix3, Quaternion, Rotation3, UnitQuaternion};
 use super::recording::Recording;
 use super::row::{Located, Row, Sample};
 use super::table::{Format, LARGEST_MM, Table};
-use super::{MotionError, c3d, jaw::condylar_middle, markers::Body, ranges_of, require};
+use super::{TrajectoryError, c3d, jaw::condylar_middle, markers::Body, ranges_of, require};
 
 /// The names of a file's axes, each with its direction.
 pub(super) const SIGNED_AXES: [&str; 6] = ["+x", "-x", "+y", "-y", "+z", "-z"];
@@ -34,7 +34,7 @@ pub(super) struct Source<'a> {
 
 impl<'a> Source<'a> {
     /// Reads the file and checks the keys of its section.
-    pub(super) fn read(config: &'a FileConfig, jaw: &JawConfig) -> Result<Self, MotionError> {
+    pub(super) fn read(config: &'a FileConfig, jaw: &JawConfig) -> Result<Self, TrajectoryError> {
         config.check_ranges(ranges_of("motion"))?;
         let lowpass_hz = config.lowpass_hz;
         let holds = lowpass_hz == 0.0 || (0.5..=50.0).contains(&lowpass_hz);
@@ -63,7 +63,7 @@ impl<'a> Source<'a> {
     }
 
     /// The rows in the jaw frame.
-    pub(super) fn samples(&self) -> Result<Vec<Sample>, MotionError> {
+    pub(super) fn samples(&self) -> Result<Vec<Sample>, TrajectoryError> {
         let sample = |row: &Row| {
             let displacement = self.displacement(row, &self.axes)?;
             Ok(Sample { line: row.line, time_s: row.time_s, displacement })
@@ -73,7 +73,7 @@ impl<'a> Source<'a> {
     }
 
     /// The smooth motion through the rows.
-    pub(super) fn recording(&self, samples: &[Sample]) -> Result<Recording, MotionError> {
+    pub(super) fn recording(&self, samples: &[Sample]) -> Result<Recording, TrajectoryError> {
         let path = &self.config.path;
         // Without an incisal point, the markers' centroid stands for it.
         let are_of_centroid = !self.shows_condyles();
@@ -124,7 +124,7 @@ fn of_c3d(bytes: &[u8], config: &FileConfig) -> Result<Table, Located> {
 ///
 /// # Errors
 /// For an unusable file: the line, the reason and a remedy.
-pub fn plain_form(config: &FileConfig, jaw: &JawConfig) -> Result<String, MotionError> {
+pub fn plain_form(config: &FileConfig, jaw: &JawConfig) -> Result<String, TrajectoryError> {
     Source::read(config, jaw).map(|source| source.table.plain(&config.path))
 }
 

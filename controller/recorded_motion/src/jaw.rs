@@ -4,13 +4,13 @@
 use masseter_model::geometry::Vec3;
 use masseter_scenario::JawConfig;
 
-use super::{MotionError, ranges_of, require};
+use super::{TrajectoryError, ranges_of, require};
 
 /// Incisal point, right and left condyle in the jaw frame at the closed pose, m.
 ///
 /// # Errors
 /// When a dimension of the mandible lies outside its range.
-pub fn jaw_points(jaw: &JawConfig) -> Result<[Vec3; 3], MotionError> {
+pub fn points_in_jaw_frame(jaw: &JawConfig) -> Result<[Vec3; 3], TrajectoryError> {
     let middle = condylar_middle(jaw)?;
     let aside = Vec3::new(0.0, jaw.bonwill_side_m / 2.0, 0.0);
     Ok([Vec3::zeros(), middle - aside, middle + aside])
@@ -20,7 +20,7 @@ pub fn jaw_points(jaw: &JawConfig) -> Result<[Vec3; 3], MotionError> {
 ///
 /// # Errors
 /// When a dimension of the mandible lies outside its range.
-pub fn condylar_middle(jaw: &JawConfig) -> Result<Vec3, MotionError> {
+pub fn condylar_middle(jaw: &JawConfig) -> Result<Vec3, TrajectoryError> {
     let side_m = jaw.bonwill_side_m;
     let balkwill_deg = jaw.balkwill_angle_deg;
     jaw.check_ranges(ranges_of("jaw"))?;

@@ -24,10 +24,10 @@ mod table;
 mod units;
 
 pub use doubts::Glitch;
-pub use error::{MotionError, ranges_of, require};
+pub use error::{TrajectoryError, ranges_of, require};
 pub use frames::{Frame, Frames};
 pub use import::plain_form;
-pub use jaw::{condylar_middle, jaw_points};
+pub use jaw::{condylar_middle, points_in_jaw_frame};
 pub use plausible::{Implausible, import};
 pub use recording::Recording;
 pub use signals::{RecordedSignal, recorded_signals};

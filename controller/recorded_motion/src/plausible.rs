@@ -6,7 +6,7 @@
 
 use masseter_scenario::{FileConfig, IfImplausible, JawConfig, LengthUnit, TimeUnit};
 
-use super::MotionError;
+use super::TrajectoryError;
 use super::doubts::{GLIDE_M, NOTHING_M, TURN_DEG_PER_M, largest, quantile};
 use super::frames::Frames;
 use super::import::Source;
@@ -100,7 +100,7 @@ impl Judgement {
         samples: &[Sample],
         config: &FileConfig,
         jaw: &JawConfig,
-    ) -> Result<Self, MotionError> {
+    ) -> Result<Self, TrajectoryError> {
         let mut implausible = implausible(source, samples, jaw)?;
         if implausible.is_empty() {
             return Ok(Self { frames: Frames::new(source, config, jaw)?, ..Self::default() });
@@ -131,7 +131,10 @@ impl Judgement {
 }
 
 /// Reads, converts to the jaw frame and smooths. What is no motion of a jaw is refused, or played with a warning.
-pub fn import(config: &FileConfig, jaw: &JawConfig) -> Result<Recording, MotionError> {
+///
+/// # Errors
+/// For a file that cannot be read, a value out of its range, and a motion that is none of a jaw.
+pub fn import(config: &FileConfig, jaw: &JawConfig) -> Result<Recording, TrajectoryError> {
     let source = Source::read(config, jaw)?;
     let samples = source.samples()?;
     let mut recording = source.recording(&samples)?;
@@ -147,7 +150,7 @@ pub fn import(config: &FileConfig, jaw: &JawConfig) -> Result<Recording, MotionE
 
 /// The unit in which everything is plausible, and the frames in this unit.
 fn in_likely_unit(config: &FileConfig, jaw: &JawConfig) -> Option<(Unit, Option<Frames>)> {
-    let in_unit = |unit: Unit| -> Result<_, MotionError> {
+    let in_unit = |unit: Unit| -> Result<_, TrajectoryError> {
         let changed = unit.applied(config);
         let source = Source::read(&changed, jaw)?;
         let is_plausible = implausible(&source, &source.samples()?, jaw)?.is_empty();
@@ -180,8 +183,8 @@ fn implausible(
     source: &Source,
     samples: &[Sample],
     jaw: &JawConfig,
-) -> Result<Vec<Implausible>, MotionError> {
-    let [incisal, right, left] = super::jaw::jaw_points(jaw)?;
+) -> Result<Vec<Implausible>, TrajectoryError> {
+    let [incisal, right, left] = super::jaw::points_in_jaw_frame(jaw)?;
     let middle = (right + left) / 2.0;
     let is_of_poses = source.table.format == super::table::Format::Poses;
     let point = if is_of_poses { source.reference } else { incisal };

@@ -4,7 +4,7 @@
 
 use masseter_model::geometry::{Pose, Vec3};
 
-use super::MotionError;
+use super::TrajectoryError;
 
 /// What trackers write for a lost sample, besides an empty cell.
 const LOST: [&str; 12] =
@@ -56,9 +56,9 @@ impl Located {
         Self { line: None, problem }
     }
 
-    pub(super) fn in_file(self, path: &std::path::Path) -> MotionError {
+    pub(super) fn in_file(self, path: &std::path::Path) -> TrajectoryError {
         let line = self.line.map_or_else(String::new, |line| format!(":{line}"));
-        MotionError(format!("{}{line}: {}", path.display(), self.problem))
+        TrajectoryError(format!("{}{line}: {}", path.display(), self.problem))
     }
 }
 

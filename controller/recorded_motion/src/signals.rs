@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use masseter_scenario::{FileConfig, JawConfig};
 
-use super::{MotionError, import::Source, table::LARGEST_GAP_S};
+use super::{TrajectoryError, import::Source, table::LARGEST_GAP_S};
 
 /// Largest difference of times by rounding, s.
 const SAME_TIME_S: f64 = 1e-6;
@@ -40,7 +40,10 @@ impl RecordedSignal {
 ///
 /// # Errors
 /// For an unusable file: the line, the reason and a remedy.
-pub fn recorded_signals(config: &FileConfig, jaw: &JawConfig) -> Result<Vec<RecordedSignal>, MotionError> {
+pub fn recorded_signals(
+    config: &FileConfig,
+    jaw: &JawConfig,
+) -> Result<Vec<RecordedSignal>, TrajectoryError> {
     let table = Source::read(config, jaw)?.table;
     let (extras, begin_s) = (&table.extras, table.rows[0].time_s);
     let time_s: Arc<[f64]> = extras.rows.iter().map(|row| row.time_s - begin_s).collect();

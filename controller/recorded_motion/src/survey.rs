@@ -130,12 +130,12 @@ pub struct SurveyRow {
 ///
 /// # Errors
 /// For an unusable file: the line, the reason and a remedy.
-pub fn survey(config: &FileConfig, jaw: &JawConfig) -> Result<RecordingSurvey, super::MotionError> {
+pub fn survey(config: &FileConfig, jaw: &JawConfig) -> Result<RecordingSurvey, super::TrajectoryError> {
     let source = Source::read(config, jaw)?;
     let samples = source.samples()?;
     let recording = source.recording(&samples)?;
     let Judgement { implausible, likely, frames } = Judgement::new(&source, &samples, config, jaw)?;
-    let points = super::jaw::jaw_points(jaw)?;
+    let points = super::jaw::points_in_jaw_frame(jaw)?;
     let table = &source.table;
     let row = |sample: &Sample| SurveyRow {
         time_s: sample.time_s - samples[0].time_s,

@@ -8,7 +8,7 @@
 use masseter_model::geometry::{
     AXES, AXIS_NAMES, Conditioning, Jacobian, LEGS, Mechanism, Pose, StrokeLimits,
 };
-use masseter_recorded_motion::MotionError;
+use masseter_recorded_motion::TrajectoryError;
 use masseter_scenario::TrajectoryLimitsConfig;
 
 use super::motion::Trajectory;
@@ -58,7 +58,7 @@ pub fn check(
     mechanism: &Mechanism,
     limits: &TrajectoryLimitsConfig,
     period_s: f64,
-) -> Result<TrajectoryReport, MotionError> {
+) -> Result<TrajectoryReport, TrajectoryError> {
     let samples = (trajectory.duration_s() / period_s).ceil() as usize + 1;
     let report = TrajectoryReport {
         lowest_m: [f64::INFINITY; AXES],
@@ -72,7 +72,7 @@ pub fn check(
         let time_s = sample as f64 * period_s;
         survey.visit(&trajectory.pose(time_s)).map_err(|problem| {
             let line = trajectory.source_line(time_s).map_or_else(String::new, |line| format!(" ({line})"));
-            MotionError(format!("motion at {time_s:.3} s{line}: {problem}"))
+            TrajectoryError(format!("motion at {time_s:.3} s{line}: {problem}"))
         })?;
     }
     Ok(survey.report)

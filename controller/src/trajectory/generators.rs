@@ -1,7 +1,7 @@
 //! Generated motions of the jaw: chewing, opening, protrusion and lateral excursion, in a rhythm of phases.
 
 use masseter_model::geometry::Pose;
-use masseter_recorded_motion::{MotionError, ranges_of};
+use masseter_recorded_motion::{TrajectoryError, ranges_of};
 use masseter_scenario::{
     ChewingConfig, JawConfig, LateralConfig, OpeningConfig, PhaseShares, ProtrusionConfig,
 };
@@ -43,7 +43,7 @@ pub(super) struct Chewing {
 }
 
 impl Chewing {
-    pub(super) fn new(config: &ChewingConfig, jaw: &JawConfig) -> Result<Self, MotionError> {
+    pub(super) fn new(config: &ChewingConfig, jaw: &JawConfig) -> Result<Self, TrajectoryError> {
         let ChewingConfig { vertical_mm, lateral_mm, anterior_posterior_mm, side, .. } = *config;
         config.check_ranges(ranges_of("motion"))?;
         let mut chewing = Self {
@@ -74,7 +74,7 @@ impl Chewing {
     }
 
     /// The balancing condyle's advance that swings the widest open jaw this far to the side.
-    fn balancing_for(&self, lateral_mm: f64, sign: f64) -> Result<f64, MotionError> {
+    fn balancing_for(&self, lateral_mm: f64, sign: f64) -> Result<f64, TrajectoryError> {
         let swing_m = |balancing_m| {
             let widest = Self { balancing_m, ..*self }.posture(self.cycle.opening)?;
             Some(sign * self.mandible.displacement(&widest).translation.y)
@@ -82,7 +82,7 @@ impl Chewing {
         reach("motion.lateral_mm", lateral_mm, CHEWING_BALANCING_M, swing_m)
     }
 
-    fn prove(&self) -> Result<(), MotionError> {
+    fn prove(&self) -> Result<(), TrajectoryError> {
         for point in 0..PROOF_POINTS {
             let phase = f64::from(point) / f64::from(PROOF_POINTS);
             let problem = match self.posture(phase) {
@@ -96,7 +96,7 @@ impl Chewing {
                 ),
                 Some(_) => continue,
             };
-            return Err(MotionError(format!("motion: at {phase:.2} of the chewing cycle {problem}")));
+            return Err(TrajectoryError(format!("motion: at {phase:.2} of the chewing cycle {problem}")));
         }
         Ok(())
     }
@@ -117,7 +117,7 @@ pub(super) struct Excursion {
 }
 
 impl Excursion {
-    pub(super) fn opening(config: &OpeningConfig, jaw: &JawConfig) -> Result<Self, MotionError> {
+    pub(super) fn opening(config: &OpeningConfig, jaw: &JawConfig) -> Result<Self, TrajectoryError> {
         config.check_ranges(ranges_of("motion"))?;
         let mandible = Mandible::symmetric(jaw, config.condylar_inclination_deg)?;
         let cycle = MotionRhythm::new(config.cycle_rate_hz, &config.phases)?;
@@ -131,7 +131,7 @@ impl Excursion {
         Ok(Self { mandible, cycle, farthest: posture(pitch_rad) })
     }
 
-    pub(super) fn protrusion(config: &ProtrusionConfig, jaw: &JawConfig) -> Result<Self, MotionError> {
+    pub(super) fn protrusion(config: &ProtrusionConfig, jaw: &JawConfig) -> Result<Self, TrajectoryError> {
         config.check_ranges(ranges_of("motion"))?;
         let mandible = Mandible::symmetric(jaw, config.condylar_inclination_deg)?;
         let cycle = MotionRhythm::new(config.cycle_rate_hz, &config.phases)?;
@@ -139,7 +139,7 @@ impl Excursion {
         Ok(Self { mandible, cycle, farthest })
     }
 
-    pub(super) fn lateral(config: &LateralConfig, jaw: &JawConfig) -> Result<Self, MotionError> {
+    pub(super) fn lateral(config: &LateralConfig, jaw: &JawConfig) -> Result<Self, TrajectoryError> {
         config.check_ranges(ranges_of("motion"))?;
         let LateralConfig { condylar_inclination_deg, bennett_angle_deg, side, .. } = *config;
         let mandible = Mandible::new(jaw, condylar_inclination_deg, bennett_angle_deg, side)?;
@@ -159,7 +159,7 @@ impl Excursion {
 }
 
 /// The coordinate at which the incisal point's travel, metres, is the amplitude.
-fn farthest(amplitude_mm: f64, highest: f64, travel_m: impl Fn(f64) -> f64) -> Result<f64, MotionError> {
+fn farthest(amplitude_mm: f64, highest: f64, travel_m: impl Fn(f64) -> f64) -> Result<f64, TrajectoryError> {
     reach("motion.amplitude_mm", amplitude_mm, highest, |coordinate| Some(travel_m(coordinate)))
 }
 
@@ -176,13 +176,13 @@ pub(super) struct MotionRhythm {
 }
 
 impl MotionRhythm {
-    fn new(rate_hz: f64, phases: &PhaseShares) -> Result<Self, MotionError> {
+    fn new(rate_hz: f64, phases: &PhaseShares) -> Result<Self, TrajectoryError> {
         let PhaseShares { opening, closing, occlusion } = *phases;
         phases.check_ranges(ranges_of("motion.phases"))?;
         let sum = opening + closing + occlusion;
         if (sum - 1.0).abs() > 1e-6 {
             let problem = "opening, closing and occlusion must add up to 1";
-            return Err(MotionError(format!("motion.phases add up to {sum:?}; {problem}")));
+            return Err(TrajectoryError(format!("motion.phases add up to {sum:?}; {problem}")));
         }
         Ok(Self { rate_hz, opening, closing })
     }

@@ -10,7 +10,7 @@
 //! neither discs, muscles nor tooth contacts guide anything.
 
 use masseter_model::geometry::{Actuators, LEGS, Mechanism, Pose, Vec3};
-use masseter_recorded_motion::{MotionError, condylar_middle, jaw_points, ranges_of};
+use masseter_recorded_motion::{TrajectoryError, condylar_middle, points_in_jaw_frame, ranges_of};
 use masseter_scenario::{JawConfig, JawSide};
 use nalgebra::{Quaternion, Translation3, UnitQuaternion};
 
@@ -67,7 +67,7 @@ impl Mandible {
         inclination_deg: f64,
         bennett_angle_deg: f64,
         working: JawSide,
-    ) -> Result<Self, MotionError> {
+    ) -> Result<Self, TrajectoryError> {
         let (down, forward) = inclination_deg.to_radians().sin_cos();
         let (inward, straight) = bennett_angle_deg.to_radians().sin_cos();
         let working = working.sign();
@@ -83,7 +83,7 @@ impl Mandible {
     }
 
     /// A mandible for symmetric motions.
-    pub(super) fn symmetric(jaw: &JawConfig, inclination_deg: f64) -> Result<Self, MotionError> {
+    pub(super) fn symmetric(jaw: &JawConfig, inclination_deg: f64) -> Result<Self, TrajectoryError> {
         Self::new(jaw, inclination_deg, 0.0, JawSide::Left)
     }
 
@@ -150,7 +150,7 @@ pub(super) fn reach(
     amplitude_mm: f64,
     highest: f64,
     travel_m: impl Fn(f64) -> Option<f64>,
-) -> Result<f64, MotionError> {
+) -> Result<f64, TrajectoryError> {
     let (mut below, mut above) = (0.0, highest);
     for _ in 0..60 {
         let middle = f64::midpoint(below, above);
@@ -159,7 +159,7 @@ pub(super) fn reach(
     }
     let reached_mm = 1000.0 * travel_m(below).unwrap_or_default();
     if amplitude_mm - reached_mm > REACHED_MM {
-        return Err(MotionError(format!(
+        return Err(TrajectoryError(format!(
             "{name} of {amplitude_mm:?} mm is out of reach: the mandible reaches at most {reached_mm:.1} mm; \
              choose a smaller amplitude"
         )));
@@ -180,7 +180,7 @@ pub(super) struct JawFrame {
 }
 
 impl JawFrame {
-    pub(super) fn new(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Self, MotionError> {
+    pub(super) fn new(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Self, TrajectoryError> {
         let closed = closed_pose(jaw, mechanism)?;
         let jaw_in_platform = jaw_in_platform(jaw, &closed);
         Ok(Self { jaw: closed * jaw_in_platform, platform_in_jaw: jaw_in_platform.inverse() })
@@ -201,12 +201,12 @@ fn jaw_in_platform(jaw: &JawConfig, closed: &Pose) -> Pose {
 ///
 /// # Errors
 /// When a value lies outside its range, or no such pose exists.
-pub fn closed_pose(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Pose, MotionError> {
+pub fn closed_pose(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Pose, TrajectoryError> {
     let JawConfig { closed_leg_m, closed_offset_m, .. } = *jaw;
     jaw.check_ranges(ranges_of("jaw"))?;
     let actuators = Actuators { slide_m: [0.0; LEGS], leg_m: [closed_leg_m; LEGS] };
     let closed = crate::kinematics::solve_completely(mechanism, &actuators).map_err(|error| {
-        MotionError(format!("jaw.closed_leg_m = {closed_leg_m:?} m gives no closed pose: {error}"))
+        TrajectoryError(format!("jaw.closed_leg_m = {closed_leg_m:?} m gives no closed pose: {error}"))
     })?;
     Ok(Translation3::from(closed_offset_m) * closed.pose)
 }
@@ -215,9 +215,9 @@ pub fn closed_pose(jaw: &JawConfig, mechanism: &Mechanism) -> Result<Pose, Motio
 ///
 /// # Errors
 /// When a dimension of the mandible lies outside its range.
-pub fn closed_jaw_points(jaw: &JawConfig, closed: &Pose) -> Result<[Vec3; 3], MotionError> {
+pub fn closed_jaw_points(jaw: &JawConfig, closed: &Pose) -> Result<[Vec3; 3], TrajectoryError> {
     let jaw_in_platform = jaw_in_platform(jaw, closed);
-    Ok(jaw_points(jaw)?.map(|point| jaw_in_platform.transform_point(&point.into()).coords))
+    Ok(points_in_jaw_frame(jaw)?.map(|point| jaw_in_platform.transform_point(&point.into()).coords))
 }
 
 #[cfg(test)]

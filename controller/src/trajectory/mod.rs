@@ -16,7 +16,7 @@ use masseter_model::geometry::Pose;
 pub use check::{TrajectoryReport, check};
 pub(crate) use generators::minimum_jerk;
 pub use mandible::{closed_jaw_points, closed_pose};
-pub use masseter_recorded_motion::MotionError;
+pub use masseter_recorded_motion::TrajectoryError;
 pub use motion::Trajectory;
 
 /// The pose at a share of the way from one pose to another, for position and turn.

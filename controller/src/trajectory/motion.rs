@@ -2,7 +2,7 @@
 //! motion starts and ends at rest on its unchanged path.
 
 use masseter_model::geometry::{Mechanism, Pose};
-use masseter_recorded_motion::{MotionError, Recording, import, require};
+use masseter_recorded_motion::{Recording, TrajectoryError, import, require};
 use masseter_scenario::{JawConfig, MotionConfig, Scenario};
 
 use super::generators::{Chewing, Excursion, minimum_jerk_integral};
@@ -55,7 +55,7 @@ impl Trajectory {
         jaw: &JawConfig,
         mechanism: &Mechanism,
         duration_s: Option<f64>,
-    ) -> Result<Self, MotionError> {
+    ) -> Result<Self, TrajectoryError> {
         if let Some(duration_s) = duration_s {
             require("duration_s", duration_s, duration_s > 0.0, "above 0")?;
         }
@@ -75,7 +75,7 @@ impl Trajectory {
     ///
     /// # Errors
     /// Those of [`Self::new`].
-    pub fn of_scenario(scenario: &Scenario, mechanism: &Mechanism) -> Result<Self, MotionError> {
+    pub fn of_scenario(scenario: &Scenario, mechanism: &Mechanism) -> Result<Self, TrajectoryError> {
         let motion = Self::new(&scenario.motion, &scenario.jaw, mechanism, scenario.duration_s)?;
         Ok(motion.slowed(scenario.dry.speed_now()))
     }

@@ -21,7 +21,7 @@ fn build(motion: &MotionConfig, duration_s: Option<f64>) -> Trajectory {
     Trajectory::new(motion, &JawConfig::default(), &mechanism(), duration_s).unwrap()
 }
 
-fn judge(trajectory: &Trajectory) -> Result<TrajectoryReport, MotionError> {
+fn judge(trajectory: &Trajectory) -> Result<TrajectoryReport, TrajectoryError> {
     check(trajectory, &mechanism(), &TrajectoryLimitsConfig::default(), PERIOD_S)
 }
 

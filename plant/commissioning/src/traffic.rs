@@ -78,9 +78,7 @@ impl Traffic {
     pub(crate) fn send(&mut self, bus: usize, frame: Frame) -> Result<(), LineError> {
         self.wires.send(bus, frame).map_err(|error| match error {
             SendError::Os { errno } => self.failed(bus, errno),
-            SendError::QueueFull { .. } if matches!(self.wires, Wires::Real(_)) => {
-                self.failed(bus, FULL_QUEUE)
-            }
+            SendError::QueueFull { .. } if self.wires.are_real() => self.failed(bus, FULL_QUEUE),
             _ => LineError::Send { bus, error },
         })
     }

@@ -75,8 +75,7 @@ impl SdoClient {
         self.transfer.is_some_and(|transfer| transfer.attempt > 1)
     }
 
-    /// Begins a transfer anew after a silence of more than `timeout_ns`. Gives the transfer up after the
-    /// last attempt.
+    /// Begins a transfer anew after a silence of more than `timeout_ns`. Gives the transfer up after the last attempt.
     ///
     /// # Errors
     /// [`SdoFailure`] of the transfer that is given up.

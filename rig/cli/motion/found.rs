@@ -4,7 +4,7 @@ use masseter_controller::trajectory::Trajectory;
 use masseter_judge::{RecordedFigures, RecordedWatch};
 use masseter_model::geometry::{AXES, AXIS_NAMES, Mechanism};
 use masseter_plan::{best_placement, demands};
-use masseter_recorded_motion::{Frame, Frames, MotionError, RecordingSurvey, Unit, survey};
+use masseter_recorded_motion::{Frame, Frames, RecordingSurvey, TrajectoryError, Unit, survey};
 use masseter_scenario::{MotionConfig, Scenario};
 use serde::Serialize;
 
@@ -95,7 +95,7 @@ impl Judged {
 
 impl Strokes {
     /// What a motion leaves of the strokes, if the rig would play it.
-    fn left(scenario: &Scenario, mechanism: &Mechanism) -> Result<Self, MotionError> {
+    fn left(scenario: &Scenario, mechanism: &Mechanism) -> Result<Self, TrajectoryError> {
         let trajectory = Trajectory::new(&scenario.motion, &scenario.jaw, mechanism, scenario.duration_s)?;
         let margin_m = demands(scenario, &trajectory, mechanism)?.margin_m(mechanism.strokes());
         let axis = (0..AXES).min_by(|&a, &b| margin_m[a].total_cmp(&margin_m[b])).unwrap_or_default();

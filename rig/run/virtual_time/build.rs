@@ -5,10 +5,12 @@ use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 /// Where these sources are, from this package.
-const FOLDERS: [&str; 6] = [
+const FOLDERS: [&str; 8] = [
     "src",
+    "../../../plant/drives/src",
     "../../../plant/src",
     "../../../shared/can/src",
+    "../../../shared/messages/src",
     "../../../shared/model/src",
     "../../../shared/runtime/src",
     "../../../shared/scenario/src",

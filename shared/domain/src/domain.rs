@@ -63,6 +63,9 @@ pub struct ScratchDomain {
 
 impl ScratchDomain {
     /// Claims a domain with a name that no other process takes.
+    ///
+    /// # Errors
+    /// As [`Domain::named`] and [`Domain::claim`].
     pub fn claim(name: &str) -> Result<Self, DomainError> {
         let domain = Domain::named(&format!("{name}-{}", std::process::id()))?;
         let claim = Some(domain.claim()?);
@@ -88,6 +91,9 @@ impl Drop for ScratchDomain {
 
 impl Domain {
     /// A domain by its id, in the private folder of this user.
+    ///
+    /// # Errors
+    /// [`DomainError::BadName`], and [`DomainError::NotPrivate`] without a private folder.
     pub fn named(id: &str) -> Result<Self, DomainError> {
         if is_id(id) {
             Ok(Self { id: id.to_owned(), root: folder::folder()?.join(id) })
@@ -116,6 +122,9 @@ impl Domain {
     }
 
     /// Locks the domain for this process and its children until the end of all.
+    ///
+    /// # Errors
+    /// [`DomainError::InUse`] for a domain of living processes, [`DomainError::Busy`], or a refusal of the file system.
     pub fn claim(&self) -> Result<DomainLock, DomainError> {
         let _turn = self.take_turn()?;
         if self.is_locked() {
@@ -135,6 +144,9 @@ impl Domain {
     }
 
     /// Whether any process of the run still lives.
+    ///
+    /// # Errors
+    /// [`DomainError::Busy`], or a refusal of the file system.
     pub fn is_alive(&self) -> Result<bool, DomainError> {
         let _turn = self.take_turn()?;
         Ok(self.is_locked())
@@ -142,6 +154,9 @@ impl Domain {
 
     /// Removes the files of a domain without a living process from shared memory and the file system. Keeps the files
     /// of a living domain.
+    ///
+    /// # Errors
+    /// [`DomainError::Busy`], or a refusal of the file system.
     pub fn sweep(&self) -> Result<Option<Swept>, DomainError> {
         let _turn = self.take_turn()?;
         if self.is_locked() { Ok(None) } else { self.remove_files().map(Some) }
@@ -215,6 +230,9 @@ impl Domain {
     }
 
     /// Every domain of this user with files.
+    ///
+    /// # Errors
+    /// [`DomainError::NotPrivate`] without a private folder, or a refusal of the file system.
     pub fn all() -> Result<Vec<Self>, DomainError> {
         let mut domains = Vec::new();
         for folder in folder::folders()? {
@@ -225,6 +243,9 @@ impl Domain {
     }
 
     /// The domains with a living process and a file of this name, such as a socket, in the root folder.
+    ///
+    /// # Errors
+    /// As [`Self::all`].
     pub fn serving(name: &str) -> Result<Vec<Self>, DomainError> {
         let serves = |domain: &Self| domain.root.join(name).exists() && domain.is_alive().unwrap_or(false);
         Ok(Self::all()?.into_iter().filter(serves).collect())
@@ -235,6 +256,7 @@ impl Domain {
     fn take_turn(&self) -> Result<File, DomainError> {
         let path = self.root.with_file_name(TURN);
         let turn = folder::open(&path)?;
+        // The clock is above this crate.
         let mut polls = TURN_TIMEOUT.as_millis() / TURN_POLL.as_millis();
         loop {
             match turn.try_lock() {

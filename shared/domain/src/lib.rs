@@ -1,8 +1,8 @@
 //! The domain of a run: its names, lock and private folder, and the opening of its topics on iceoryx2.
 //!
-//! Code of a start is here, and no code of a cycle: messages are sent and received in `masseter-runtime`. Opening a
-//! topic is a third of the runtime's machine code, because iceoryx2's ports are generic; unoptimised it compiles in a
-//! fraction of the time (notes/realtime-log.md#the-first-build).
+//! The functions that only a start runs are compiled here, unoptimised. iceoryx2's ports are generic: their opening was
+//! two thirds of the runtime's LLVM code (notes/realtime-log.md#the-first-build). Messages are sent and received in
+//! `masseter-runtime`, which also compiles the methods of [`Port`].
 
 mod domain;
 mod folder;

@@ -58,7 +58,8 @@ fn remedy(reason: &str) -> &'static str {
     }
 }
 
-/// The error of an action on a topic, for `map_err`. Formats outside of the hot path: formatting code within the hot path makes a round trip a tenth slower.
+/// The error of an action on a topic, for `map_err`. The text is formatted outside of the hot path: formatting code
+/// within the hot path makes a round trip a tenth slower.
 pub fn failed<E: Debug>(verb: &'static str, what: &str) -> impl FnOnce(E) -> TransportError {
     #[cold]
     fn error(verb: &str, what: &str, cause: &dyn Debug) -> TransportError {
@@ -76,6 +77,9 @@ pub struct Node {
 
 impl Node {
     /// Joins the domain. iceoryx2 installs no signal handlers.
+    ///
+    /// # Errors
+    /// For a domain without a claim, and when iceoryx2 cannot make its files.
     pub fn join(domain: &Domain) -> Result<Self, TransportError> {
         set_log_level(LogLevel::Fatal);
         let id = domain.id();

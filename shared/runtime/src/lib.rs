@@ -1,7 +1,8 @@
 //! The common runtime of both sides of the rig: messages and their transport, the schedule of the bus, and the
 //! real-time loop. Also the life of a process, and the trait `Controller` with its session.
 //!
-//! Geometry and dynamics are in `masseter-model`, scenarios in `masseter-scenario`. This crate is the same in every process.
+//! Geometry and dynamics are in `masseter-model`, scenarios in `masseter-scenario`, messages in `masseter-messages`,
+//! names and files of a run in `masseter-domain`. This crate is the same in every process.
 
 pub mod clock;
 pub mod control;

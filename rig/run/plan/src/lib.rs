@@ -17,7 +17,7 @@ mod stiffness;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, ensure};
-use masseter_controller::trajectory::{self, MotionError, Trajectory, TrajectoryReport};
+use masseter_controller::trajectory::{self, Trajectory, TrajectoryError, TrajectoryReport};
 use masseter_model::{dynamics::Friction, geometry::Mechanism};
 use masseter_plant::core as plant;
 use masseter_runtime::schedule::CycleSchedule;
@@ -166,7 +166,7 @@ pub fn demands(
     scenario: &Scenario,
     trajectory: &Trajectory,
     mechanism: &Mechanism,
-) -> Result<TrajectoryReport, MotionError> {
+) -> Result<TrajectoryReport, TrajectoryError> {
     let limits = scenario.limits.within(&scenario.drives);
     trajectory::check(trajectory, mechanism, &limits, scenario.period_s())
 }

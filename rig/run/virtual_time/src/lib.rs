@@ -1,8 +1,7 @@
 //! The [`Rig`] that steps, and the run under virtual time: a loop over a rig in one thread, as fast as it goes. The
 //! messages of a run go to a [`Sink`]. No process, no transport and no clock of the machine is involved.
 //!
-//! This is a crate of its own because the compiler makes the code of a cycle where the ports are known. That is here,
-//! fully optimised.
+//! This is a crate of its own because the compiler makes the code of a cycle where the ports are known. That is here.
 
 mod branches;
 mod log;
