@@ -27,7 +27,7 @@ use std::path::Path;
 use circles::circles;
 use features::other_features;
 use impls::split_types;
-use layers::{ROOMS, Room, dependencies_of, layer_violations, room_violations};
+use layers::{ROOMS, Room, dependencies_of, folders_below, layer_violations, room_violations};
 use orphans::orphans;
 
 #[test]
@@ -48,6 +48,18 @@ fn the_crate_of_can_stands_alone() {
 fn the_crate_of_drives_stands_on_that_of_can_alone() {
     let used = dependencies_of(project(), "masseter-drives");
     assert_eq!(used, ["arrayvec", "masseter-can", "serde", "thiserror"]);
+}
+
+/// A snapshot holds the state of the plant: a build with other sources refuses the file.
+#[test]
+fn snapshots_name_the_sources_of_the_plant_and_of_all_crates_below() {
+    let build = fs::read_to_string(project().join("rig/run/virtual_time/build.rs")).unwrap();
+    let (_, folders) = build.split_once("const FOLDERS").unwrap();
+    let folder =
+        |line: &str| Some(line.trim().strip_prefix("\"../../../")?.strip_suffix("/src\",")?.to_owned());
+    let mut named: Vec<_> = folders.lines().filter_map(folder).collect();
+    named.sort();
+    assert_eq!(named, folders_below(project(), "masseter-plant"));
 }
 
 #[test]

@@ -278,3 +278,23 @@ pub(super) fn dependencies_of(workspace: &Path, crate_name: &str) -> Vec<String>
     let for_use = list(&package["dependencies"]).iter().filter(|dependency| dependency["kind"] != "dev");
     for_use.map(|dependency| text(&dependency["name"]).to_owned()).collect()
 }
+
+/// The folders of a crate of the workspace and of all crates of the workspace that it stands on, sorted.
+pub(super) fn folders_below(workspace: &Path, crate_name: &str) -> Vec<String> {
+    let metadata = metadata(workspace);
+    let packages = list(&metadata["packages"]);
+    let (mut folders, mut names) = (Vec::new(), vec![crate_name.to_owned()]);
+    while let Some(name) = names.pop() {
+        let Some(package) = packages.iter().find(|package| package["name"] == name.as_str()) else {
+            continue;
+        };
+        let manifest = Path::new(text(&package["manifest_path"]));
+        let folder = within(workspace, manifest.parent().expect("a manifest is in a folder"));
+        if !folders.contains(&folder) {
+            folders.push(folder);
+            names.extend(dependencies_of(workspace, &name));
+        }
+    }
+    folders.sort();
+    folders
+}

@@ -4,12 +4,14 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
-/// Where these sources are, from this package.
-const FOLDERS: [&str; 8] = [
+/// Where these sources are, from this package: its own, and those of the plant and of every crate below the plant.
+const FOLDERS: [&str; 10] = [
     "src",
     "../../../plant/drives/src",
     "../../../plant/src",
     "../../../shared/can/src",
+    "../../../shared/domain/src",
+    "../../../shared/features/src",
     "../../../shared/messages/src",
     "../../../shared/model/src",
     "../../../shared/runtime/src",
